@@ -18,7 +18,7 @@ import numpy as np
 from controller.compiling.library import load_libraries
 from controller.compiling.text_cache import c_text_of
 from controller.stack_array import interpret
-from controller.translator.arguments import words_of
+from controller.translator.arguments import argument_words
 from controller.translator.types import Type, check_shapes, type_of
 
 INTERPRETED = "SUBREACH_INTERPRETED"  # environment variable: if set, Python runs all functions, without a compiler
@@ -53,7 +53,7 @@ def _load(keys: Iterable[_Key]) -> None:
 def _described(argument: Any, known: Described) -> tuple[Any, Type, list[int]]:
     description = known.get(id(argument))
     if description is None:
-        description = known[id(argument)] = argument, type_of(argument), words_of(argument)
+        description = known[id(argument)] = argument, type_of(argument), argument_words(argument)
     return description
 
 

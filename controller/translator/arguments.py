@@ -12,12 +12,12 @@ import numpy as np
 _NUMBER = struct.Struct("=d")
 
 
-def words_of(value: Any) -> list[int]:
+def argument_words(value: Any) -> list[int]:
     """Return the words of one argument: one for a number, address and shape for an array."""
     if isinstance(value, np.ndarray):
         return [value.ctypes.data, *value.shape]
     if isinstance(value, tuple):
-        return [word for item in value for word in words_of(item)]
+        return [word for item in value for word in argument_words(item)]
     if isinstance(value, float):
         return [int.from_bytes(_NUMBER.pack(value), sys.byteorder)]
     return [operator.index(value) % 2**64]

@@ -41,13 +41,13 @@ class ArrayLengths(FunctionCode):
         """Return the maximum number of elements along an axis."""
         return int(size) if size.isdigit() else self.bounds.get(size, math.inf)
 
-    def bounded(self, size: str, bound: float) -> str:
+    def note_max_size(self, size: str, bound: float) -> str:
         """Return a length that C computes, and note its maximum."""
         if not size.isdigit():
             self.bounds[size] = bound
         return size
 
-    def longer(self, size: str, number: int) -> str:
+    def add_to_length(self, size: str, number: int) -> str:
         """Return the sum of a fixed length and a number."""
         if not number:
             return size
@@ -106,4 +106,4 @@ class ArrayLengths(FunctionCode):
         for known, computed in ((one, other), (other, one)):
             if known.isdigit() and self.max_size(computed) <= int(known):
                 return known if self.max_size(computed) == int(known) else computed
-        return self.bounded(f"min_i64({one}, {other})", min(self.max_size(one), self.max_size(other)))
+        return self.note_max_size(f"min_i64({one}, {other})", min(self.max_size(one), self.max_size(other)))

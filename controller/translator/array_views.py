@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from controller.translator.array_lengths import ArrayLengths, Index
-from controller.translator.operands import Grid, Operand, Value, View
+from controller.translator.operands import LazyArray, Operand, Value, View
 from controller.translator.types import DOUBLE, Array, MaxLength, Scalar, Type
 
 ANY = "*"  # root of an array of which nothing is known
@@ -96,7 +96,7 @@ class ArrayViews(ArrayLengths):
             result = times(result, n)
         return result
 
-    def stored(self, data: str, item: Scalar, shape: Sequence[int | str]) -> View:
+    def view_of_storage(self, data: str, item: Scalar, shape: Sequence[int | str]) -> View:
         """Return the array in storage on the stack."""
         sizes = tuple(map(str, shape))
         strides = tuple(self.product(sizes[k + 1 :]) for k in range(len(sizes)))
@@ -110,7 +110,7 @@ class ArrayViews(ArrayLengths):
 
     def is_array(self, operand: Operand) -> bool:
         """Return True for an array or an expression of arrays."""
-        return isinstance(operand, View | Grid)
+        return isinstance(operand, View | LazyArray)
 
     def is_local(self, roots: frozenset[str]) -> bool:
         """Return True if an array is storage of this function."""
@@ -126,7 +126,7 @@ class ArrayViews(ArrayLengths):
                 return True
         return False
 
-    def part(self, view: View, index: str) -> View:
+    def subarray(self, view: View, index: str) -> View:
         """Return the part of an array at an index of its first axis."""
         assert isinstance(view.type, Array)
         offset = plus([view.offset, times(index, view.strides[0])])
@@ -159,4 +159,4 @@ class ArrayViews(ArrayLengths):
         """Return a new array of zeros on the stack."""
         name = self.storage("zeros", node, DOUBLE, math.prod(shape))
         self.lines.append(f"memset({name}, 0, sizeof {name});")
-        return self.stored(name, DOUBLE, shape)
+        return self.view_of_storage(name, DOUBLE, shape)

@@ -13,7 +13,7 @@ import numpy as np
 
 from controller.stack_array import array, zeros
 from controller.translator.foreign import POINTER, call_c
-from controller.translator.operands import Grid, Items, Known, Length, Operand, Value, View, bracketed
+from controller.translator.operands import Items, Known, LazyArray, Length, Operand, Value, View, in_brackets
 from controller.translator.subscripts import Subscripts
 from controller.translator.types import (
     BOOL,
@@ -24,11 +24,11 @@ from controller.translator.types import (
     Nothing,
     Record,
     Type,
+    common_type,
     known_lengths,
     name_of,
-    returned,
-    shaped,
-    unified,
+    return_type,
+    type_with_shape,
 )
 
 _MATH = {
@@ -51,7 +51,7 @@ class Calls(Subscripts):
             if self.is_array(owner):
                 return self.grid(owner, node)
         if isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
-            return self._replaced(node.func, node)
+            return self._replace_fields(node.func, node)
         called = self.expression(node.func)
         if not isinstance(called, Known):
             self.fail(node, "a call of what is no function")
@@ -61,8 +61,8 @@ class Calls(Subscripts):
         operands = self.in_order([*node.args, *(keyword.value for keyword in node.keywords)])
         name = getattr(function, "__name__", "")
         if function is call_c:
-            return self._foreign(operands, node)
-        made = self._of_arrays(function, operands, node)
+            return self._call_foreign(operands, node)
+        made = self._call_on_arrays(function, operands, node)
         if made is not None:
             return made
         if hasattr(function, "_fields"):
@@ -72,21 +72,21 @@ class Calls(Subscripts):
         if function in (abs, np.abs):
             if self.is_array(operands[0]):
                 grid = self.grid(operands[0], node)
-                return self.elementwise(lambda x: self._absolute(x[0]), [grid], grid.item, node)
-            return self._absolute(self.scalar(operands[0], node))
+                return self.elementwise(lambda x: self._absolute_value(x[0]), [grid], grid.item, node)
+            return self._absolute_value(self.scalar(operands[0], node))
         if function in _CAST:
             value = self.scalar(operands[0], node)
             kind = _CAST[function]
             if kind == BOOL != value.type:
-                return Value(BOOL, f"{bracketed(value)} != 0")
-            return Value(kind, self.converted(value, kind))
-        if _is_of(function, _MODULES) or isinstance(function, np.ufunc):
-            return self._of_math(name, operands, node)
+                return Value(BOOL, f"{in_brackets(value)} != 0")
+            return Value(kind, self.convert(value, kind))
+        if _is_from(function, _MODULES) or isinstance(function, np.ufunc):
+            return self._call_math(name, operands, node)
         if isinstance(function, FunctionType):
             return self.call_translated(function, operands, node)
         return self.fail(node, f"a call of {name or function!r}")
 
-    def _replaced(self, function: ast.Attribute, node: ast.Call) -> Value:
+    def _replace_fields(self, function: ast.Attribute, node: ast.Call) -> Value:
         """Return a named tuple with other values of some fields."""
         record = self.value(self.expression(function.value), node)
         fields = set(record.type.fields) if isinstance(record.type, Record) and not record.type.mutable else set()
@@ -98,7 +98,7 @@ class Calls(Subscripts):
         items = [changes.get(field) or self.field(record, field) for field in record.type.fields]
         return self.make_record(record.type.python, [self.value(item, node) for item in items], node)
 
-    def _of_arrays(self, function: Any, operands: Sequence[Operand], node: ast.AST) -> Operand | None:
+    def _call_on_arrays(self, function: Any, operands: Sequence[Operand], node: ast.AST) -> Operand | None:
         """Return what a function makes of, or from, whole arrays; None if it is none of these."""
         if function is zeros:
             shape = [operand.value for operand in operands if isinstance(operand, Known)]
@@ -108,12 +108,12 @@ class Calls(Subscripts):
         if function is array:
             return self.array_of(operands, node)
         if function is np.concatenate:
-            return self.concatenated(self.items_of(operands[0], node), node)
+            return self.concatenate(self.items_of(operands[0], node), node)
         if function in _REDUCED and self.is_array(operands[0]) and len(operands) == 1:
-            return self.reduced(_REDUCED[function], operands[0], node)
+            return self.reduce(_REDUCED[function], operands[0], node)
         return None
 
-    def _foreign(self, operands: Sequence[Operand], node: ast.AST) -> Value:
+    def _call_foreign(self, operands: Sequence[Operand], node: ast.AST) -> Value:
         address, listed, *arguments = operands
         kinds = [kind.value for kind in self.items_of(listed, node) if isinstance(kind, Known)]
         if len(kinds) != len(arguments):
@@ -121,7 +121,7 @@ class Calls(Subscripts):
         values = [self.value(operand, node) for operand in arguments]
         self.n_writes += 1
         self.writes_arguments = True
-        codes = [_as_kind(value, kind) for value, kind in zip(values, kinds, strict=True)]
+        codes = [_c_argument(value, kind) for value, kind in zip(values, kinds, strict=True)]
         function = f"(int (*)({', '.join(kinds)}))(intptr_t)"
         return self.temporary(INT, f"({function}{self.scalar(address, node).code})({', '.join(codes)})")
 
@@ -129,7 +129,7 @@ class Calls(Subscripts):
         """Return a new named tuple on the stack."""
         fields: tuple[str, ...] = kind._fields  # type: ignore[attr-defined]
         try:
-            types = tuple(self._shaped(kind, field, item, node) for field, item in zip(fields, items, strict=True))
+            types = tuple(self._check_shape(kind, field, item, node) for field, item in zip(fields, items, strict=True))
         except TypeError as error:
             self.fail(node, str(error))
         record, name = Record(kind, types), self.site("record", node)
@@ -137,7 +137,7 @@ class Calls(Subscripts):
             self.fail(node, f"a new State, {kind.__name__}")
         self.declared[name] = f"{self.c(record)} {name};"
         for field, item, of in zip(fields, items, types, strict=True):
-            code = f"*{item.code}" if isinstance(of, Record) else self.converted(item, of)
+            code = f"*{item.code}" if isinstance(of, Record) else self.convert(item, of)
             self.lines.append(f"{name}.{field} = {code};")
             self.made[f"{name}.{field}"] = item.roots
             self.note_lengths(f"{name}.{field}", item)
@@ -150,7 +150,9 @@ class Calls(Subscripts):
         values = [self.value(argument, node) for argument in arguments]
         names = function.__code__.co_varnames
         try:
-            kinds = tuple(self._shaped(function, name, value, node) for name, value in zip(names, values, strict=False))
+            kinds = tuple(
+                self._check_shape(function, name, value, node) for name, value in zip(names, values, strict=False)
+            )
         except TypeError as error:
             self.fail(node, str(error))
         roots = [self._all_roots(value) for value in values]
@@ -164,11 +166,11 @@ class Calls(Subscripts):
         name, result, writes, requirements = self.program.instance(function, kinds, aliases)
         operands = [a if isinstance(a, Items) else value for a, value in zip(arguments, values, strict=True)]
         for requirement in requirements:
-            left, right = (self._of_argument(n, operands, node) for n in (requirement.left, requirement.right))
+            left, right = (self._length_of_argument(n, operands, node) for n in (requirement.left, requirement.right))
             if not (left and right):
                 self.fail(node, f"arrays of lengths that C computes, in {requirement.where}")
             self.require(left, requirement.sign, right, node, requirement.where)
-        code = f"{name}({', '.join(self.converted(v, k) for v, k in zip(values, kinds, strict=True))})"
+        code = f"{name}({', '.join(self.convert(v, k) for v, k in zip(values, kinds, strict=True))})"
         if writes:
             self.n_writes += 1
             self.writes_arguments = self.writes_arguments or not all(map(self.is_local, roots))
@@ -178,11 +180,11 @@ class Calls(Subscripts):
         if not isinstance(result, Array):
             return self.temporary(result, code)
         name = self.site("r", node)
-        self.declared[name] = f"{self.c(returned(result))} {name};"
+        self.declared[name] = f"{self.c(return_type(result))} {name};"
         self.lines.append(f"{name} = {code};")
-        return self.stored(f"{name}.f", DOUBLE, known_lengths(result))
+        return self.view_of_storage(f"{name}.f", DOUBLE, known_lengths(result))
 
-    def _of_argument(self, length: Length, arguments: Sequence[Operand], node: ast.AST) -> Length | None:
+    def _length_of_argument(self, length: Length, arguments: Sequence[Operand], node: ast.AST) -> Length | None:
         """Return what a length of a called function's parameter is here."""
         if not length.path:
             return length
@@ -193,13 +195,13 @@ class Calls(Subscripts):
                 operand = self.field(operand, item)
             else:
                 operand = self.items_of(operand, node)[int(item)]
-        assert isinstance(operand, View | Grid)
+        assert isinstance(operand, View | LazyArray)
         own = self.length(operand.sizes[int(axis)])
         return own and Length(own.path, own.offset + length.offset)
 
-    def _shaped(self, owner: Any, name: str, value: Value, node: ast.AST) -> Type:
+    def _check_shape(self, owner: Any, name: str, value: Value, node: ast.AST) -> Type:
         """Return the type of a parameter or field; require the lengths of its annotation."""
-        kind = shaped(owner, name, value.type)
+        kind = type_with_shape(owner, name, value.type)
         if isinstance(kind, Array) and isinstance(value, View):
             for n, size in zip(kind.shape, value.sizes, strict=True):
                 length = self.length(size)
@@ -224,16 +226,16 @@ class Calls(Subscripts):
         own = [self.made[path] for path in self.made for root in value.roots if path.startswith(f"{root}.")]
         return value.roots.union(*own)
 
-    def _absolute(self, value: Value) -> Value:
+    def _absolute_value(self, value: Value) -> Value:
         return Value(value.type, f"{'fabs' if value.type == DOUBLE else 'llabs'}({value.code})")
 
-    def _of_math(self, name: str, operands: Sequence[Operand], node: ast.AST) -> Operand:
+    def _call_math(self, name: str, operands: Sequence[Operand], node: ast.AST) -> Operand:
         if name == "where" and len(operands) == 3:
             return self._where(operands, node)
         if any(map(self.is_array, operands)):
             item = BOOL if name in _TESTS else DOUBLE
-            return self.elementwise(lambda x: self._of_math(name, x, node), operands, item, node)
-        codes = [self.converted(self.scalar(operand, node), DOUBLE) for operand in operands]
+            return self.elementwise(lambda x: self._call_math(name, x, node), operands, item, node)
+        codes = [self.convert(self.scalar(operand, node), DOUBLE) for operand in operands]
         if name in _TESTS:
             return Value(BOOL, f"{_TESTS[name]}({', '.join(codes)}) != 0")
         if name in _MATH:
@@ -246,10 +248,10 @@ class Calls(Subscripts):
 
     def _where(self, operands: Sequence[Operand], node: ast.AST) -> Operand:
         a, b = self.grid(operands[1], node), self.grid(operands[2], node)
-        kind = unified(a.item, b.item)
+        kind = common_type(a.item, b.item)
 
         def choose(x: list[Value]) -> Value:
-            return Value(kind, f"{bracketed(x[0])} ? {bracketed(x[1], kind)} : {bracketed(x[2], kind)}")
+            return Value(kind, f"{in_brackets(x[0])} ? {in_brackets(x[1], kind)} : {in_brackets(x[2], kind)}")
 
         return self.elementwise(choose, [operands[0], a, b], kind, node)
 
@@ -257,22 +259,22 @@ class Calls(Subscripts):
         values = [self.scalar(operand, node) for operand in operands]
         kind = values[0].type
         for value in values[1:]:
-            kind = unified(kind, value.type)
+            kind = common_type(kind, value.type)
         if kind not in (DOUBLE, INT):
             self.fail(node, f"{function.__name__} of {name_of(kind)}")
         name = f"{function.__name__}_{'f64' if kind == DOUBLE else 'i64'}"
-        code = self.converted(values[0], kind)
+        code = self.convert(values[0], kind)
         for value in values[1:]:
-            code = f"{name}({code}, {self.converted(value, kind)})"
+            code = f"{name}({code}, {self.convert(value, kind)})"
         return Value(kind, code)
 
 
-def _as_kind(value: Value, kind: str) -> str:
+def _c_argument(value: Value, kind: str) -> str:
     """Return the code of an argument of a C function."""
     if isinstance(value.type, Array):
         return f"({value.code}).data"
-    return f"({kind}){'(intptr_t)' if kind == POINTER else ''}{bracketed(value)}"
+    return f"({kind}){'(intptr_t)' if kind == POINTER else ''}{in_brackets(value)}"
 
 
-def _is_of(function: Any, modules: Sequence[Any]) -> bool:
+def _is_from(function: Any, modules: Sequence[Any]) -> bool:
     return any(getattr(module, getattr(function, "__name__", ""), None) is function for module in modules)

@@ -22,8 +22,8 @@ _TYPES = {
 def call_c(address: int, kinds: tuple[str, ...], *arguments: Any) -> int:
     """Call a C function that returns an int, by its address."""
     function = ctypes.PYFUNCTYPE(ctypes.c_int, *(_TYPES[kind] for kind in kinds))(int(address))
-    returned: int = function(*map(_plain, arguments))
-    return returned
+    return_type: int = function(*map(_plain, arguments))
+    return return_type
 
 
 def _plain(argument: Any) -> Any:

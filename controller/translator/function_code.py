@@ -61,7 +61,7 @@ class FunctionCode:
     n_names: int  # number of names made so far
     sites: dict[str, int]  # number of names made so far for each line and column
 
-    def evaluate_apart(self, evaluate: Callable[[N], T], node: N) -> tuple[T, list[str], bool]:
+    def evaluate_separately(self, evaluate: Callable[[N], T], node: N) -> tuple[T, list[str], bool]:
         """Evaluate a node; return the statements that it needs, which `lines` do not have, and if they write arrays."""
         mark, n_writes = len(self.lines), self.n_writes
         result = evaluate(node)

@@ -14,7 +14,7 @@ from controller.errors import TranslationError
 from controller.translator.function_code import Aliases, Functions
 from controller.translator.operands import Length, Requirement
 from controller.translator.statements import Statements
-from controller.translator.types import Nothing, Type, returned
+from controller.translator.types import Nothing, Type, return_type
 
 _MAX_PASSES = 6  # maximum number of passes until the types of variables are fixed
 
@@ -26,7 +26,7 @@ class Function(Statements):
         self, program: Functions, function: FunctionType, arguments: tuple[Type, ...], aliases: Aliases
     ) -> None:
         self.program, self.module = program, function.__module__
-        self.globals = function.__globals__ | _captured(function)
+        self.globals = function.__globals__ | _closure_variables(function)
         text = getattr(function, "source", None)
         self.file = inspect.getsourcefile(function) or "?"
         lines, self.first_line = ([text], 1) if text else inspect.getsourcelines(function)
@@ -76,7 +76,7 @@ class Function(Statements):
         idle = {temporary for temporary in self.declared if temporary not in used}  # such as a length that nobody asks
         unused += [f"(void){temporary};" for temporary in sorted(idle)]
         body = [*variables, *self.declared.values(), *unused, *self.lines]
-        return head + _indented(body) + "}\n"
+        return head + _indent(body) + "}\n"
 
     def _state(self) -> tuple[Any, ...]:
         """Return what is known of variables."""
@@ -88,15 +88,15 @@ class Function(Statements):
             self.declaration(kind, self.variable(parameter))
             for parameter, kind in zip(self.parameters, self._arguments, strict=True)
         )
-        return f"static {self.c(returned(self.result))} {name}({parameters or 'void'})"
+        return f"static {self.c(return_type(self.result))} {name}({parameters or 'void'})"
 
 
-def _captured(function: FunctionType) -> dict[str, Any]:
+def _closure_variables(function: FunctionType) -> dict[str, Any]:
     cells = function.__closure__ or ()
     return dict(zip(function.__code__.co_freevars, (cell.cell_contents for cell in cells), strict=True))
 
 
-def _indented(lines: Sequence[str]) -> str:
+def _indent(lines: Sequence[str]) -> str:
     depth, out = 1, []
     for line in lines:
         if line.startswith("}"):

@@ -8,14 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from controller.translator.array_views import ArrayViews
-from controller.translator.operands import Grid, Items, Known, Operand, Value, View, bracketed, number
+from controller.translator.operands import Items, Known, LazyArray, Operand, Value, View, in_brackets, number
 from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, Record, Scalar, Tuple, Type, name_of
 
 
 class OperandValues(ArrayViews):
     """Compute the operands of one function; statements that they need first go to `lines`."""
 
-    def materialized(self, operand: Operand, node: ast.AST, stem: str = "a") -> View:
+    def materialize(self, operand: Operand, node: ast.AST, stem: str = "a") -> View:
         """Compute an array expression into storage on the stack."""
         raise NotImplementedError
 
@@ -27,18 +27,18 @@ class OperandValues(ArrayViews):
         """Return operands, each evaluated before the statements that the next ones need."""
         operands: list[Operand] = []
         for node in nodes:
-            operand, needed, writes = self.evaluate_apart(self.expression, node)
-            operands = [self.kept(operand, node, writes) if needed else operand for operand in operands]
+            operand, needed, writes = self.evaluate_separately(self.expression, node)
+            operands = [self.freeze(operand, node, writes) if needed else operand for operand in operands]
             self.lines += needed
             operands.append(operand)
         return operands
 
-    def kept(self, operand: Operand, node: ast.AST, written: bool = True) -> Operand:
+    def freeze(self, operand: Operand, node: ast.AST, written: bool = True) -> Operand:
         """Return an operand as it is now: an array expression is computed only if arrays are written later."""
         if isinstance(operand, Items):
-            return Items(tuple(self.kept(item, node, written) for item in operand.items))
-        if isinstance(operand, Grid) and written:
-            return self.materialized(operand, node)
+            return Items(tuple(self.freeze(item, node, written) for item in operand.items))
+        if isinstance(operand, LazyArray) and written:
+            return self.materialize(operand, node)
         if isinstance(operand, Value) and not operand.simple and isinstance(operand.type, Scalar):
             return self.temporary(operand.type, operand.code)
         return operand
@@ -47,8 +47,8 @@ class OperandValues(ArrayViews):
         """Return an operand as a C value."""
         if isinstance(operand, Value):
             return operand
-        if isinstance(operand, Grid):
-            return self.materialized(operand, node)
+        if isinstance(operand, LazyArray):
+            return self.materialize(operand, node)
         known = operand.value if isinstance(operand, Known) else None
         if isinstance(known, bool | np.bool_):
             return Value(BOOL, "true" if known else "false", True)
@@ -63,10 +63,10 @@ class OperandValues(ArrayViews):
             if any(isinstance(value.type, Record) for value in values):
                 self.fail(node, "a record in a tuple")
             kind, roots = Tuple(tuple(value.type for value in values)), [value.roots for value in values]
-            return Value(kind, self.compound(kind, [v.code for v in values]), False, frozenset().union(*roots))
+            return Value(kind, self.tuple_expression(kind, [v.code for v in values]), False, frozenset().union(*roots))
         return self.fail(node, "not a value")
 
-    def compound(self, kind: Type, codes: Sequence[str]) -> str:
+    def tuple_expression(self, kind: Type, codes: Sequence[str]) -> str:
         """Return the C expression of a tuple from its items."""
         inside = ", ".join(codes)
         braces = f"{{{inside}}}" if isinstance(kind, Tuple) and kind.uniform else inside
@@ -79,13 +79,13 @@ class OperandValues(ArrayViews):
             self.fail(node, f"{name_of(value.type)}, expected a number")
         return value
 
-    def converted(self, value: Value, kind: Type) -> str:
+    def convert(self, value: Value, kind: Type) -> str:
         """Return the C expression of a number, converted to another type of number."""
         if isinstance(value, View) and isinstance(kind, Array):
             return self.literal(value, kind)
         if value.type == kind or not isinstance(kind, Scalar):
             return value.code
-        return f"({kind.c}){bracketed(value)}"
+        return f"({kind.c}){in_brackets(value)}"
 
     def items_of(self, operand: Operand, node: ast.AST) -> list[Operand]:
         """Return the items of a tuple."""
@@ -101,6 +101,6 @@ class OperandValues(ArrayViews):
                 return [self.variable_value(k, c, operand.simple, operand.roots, p) for k, c, p in each]
             case View() if len(operand.sizes) == 1 and operand.sizes[0].isdigit():
                 return [self.element_of(operand, (str(i),)) for i in range(int(operand.sizes[0]))]
-            case Grid():
-                return self.items_of(self.materialized(operand, node), node)
+            case LazyArray():
+                return self.items_of(self.materialize(operand, node), node)
         return self.fail(node, "expected a tuple")

@@ -49,7 +49,7 @@ class View(Value):
 
 
 @dataclass(frozen=True)
-class Grid:
+class LazyArray:
     """An array expression, whose elements are computed where they are stored or added up."""
 
     item: Scalar
@@ -57,7 +57,7 @@ class Grid:
     at: Callable[[tuple[str, ...]], Value]  # an element by its index
     reads: tuple[tuple[View, bool], ...]  # what it reads, and if at the same index
     adds: bool = False  # True if an element is a sum
-    factors: tuple[Grid, Grid] | None = None  # of a product of matrices
+    factors: tuple[LazyArray, LazyArray] | None = None  # of a product of matrices
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Requirement:
     where: str  # module and function
 
 
-Operand = Value | Known | Items | Grid
+Operand = Value | Known | Items | LazyArray
 
 
 def number(x: float) -> str:
@@ -100,7 +100,7 @@ def number(x: float) -> str:
     return repr(float(x)) if x >= 0.0 and math.copysign(1.0, x) > 0.0 else f"({float(x)!r})"
 
 
-def bracketed(value: Value, kind: Type | None = None) -> str:
+def in_brackets(value: Value, kind: Type | None = None) -> str:
     """Return a value's C expression as an operand: in brackets unless it is a name, a number or a call."""
     code = value.code
     if kind is not None and kind != value.type and isinstance(kind, Scalar):

@@ -12,7 +12,7 @@ from controller.errors import TranslationError
 from controller.translator.function_code import Aliases, Instance
 from controller.translator.functions import Function
 from controller.translator.operands import Requirement
-from controller.translator.types import Array, Nothing, Record, Scalar, Tuple, Type, shaped
+from controller.translator.types import Array, Nothing, Record, Scalar, Tuple, Type, type_with_shape
 
 _HEAD = """\
 /* Translated from Python: change that text, not this one. No heap; compile with -ffp-contract=off. */
@@ -60,7 +60,7 @@ class Program:
         if not isinstance(function, FunctionType):
             raise TranslationError(f"{function!r} is no plain function, which is not translated to C")
         names = function.__code__.co_varnames
-        arguments = tuple(shaped(function, name, kind) for name, kind in zip(names, arguments, strict=False))
+        arguments = tuple(type_with_shape(function, name, kind) for name, kind in zip(names, arguments, strict=False))
         called, _, _, requirements = self.instance(function, arguments, frozenset())
         fields = "".join(f"    {self.name(kind)} a{i};\n" for i, kind in enumerate(arguments))
         arguments_text = ", ".join(
@@ -95,7 +95,7 @@ class Program:
                 raise TranslationError(f"{function.__qualname__} calls itself, which is not translated to C")
             self._under_way.add(function)
             stem = f"{function.__module__.rpartition('.')[2]}_{function.__name__.strip('_')}"
-            name = next(n for n in _numbered(stem) if n not in self._reserved)
+            name = next(n for n in _unique_names(stem) if n not in self._reserved)
             self._reserved.add(name)
             translation = Function(self, function, arguments, aliases)
             code = translation.translate(name)
@@ -124,12 +124,12 @@ class Program:
             case Array():
                 kind = replace(kind, shape=(None,) * kind.ndim)
         if kind not in self._types:
-            name, text = self._defined(kind)
+            name, text = self._define(kind)
             self._types[kind] = name
             self._definitions.append(text)
         return self._types[kind]
 
-    def _defined(self, kind: Type) -> tuple[str, str]:
+    def _define(self, kind: Type) -> tuple[str, str]:
         match kind:
             case Array():
                 return kind.c, _array(kind)
@@ -145,7 +145,7 @@ class Program:
         raise TypeError(kind)
 
     def _struct(self, stem: str, fields: Sequence[str]) -> tuple[str, str]:
-        name = next(n for n in _numbered(stem) if n not in self._types.values())
+        name = next(n for n in _unique_names(stem) if n not in self._types.values())
         inside = "".join(f"    {field}\n" for field in fields)
         return name, f"typedef struct {{\n{inside}}} {name};\n"
 
@@ -167,7 +167,7 @@ def text_of_global(value: Any) -> str:
     return f"{getattr(value, '__module__', '')}.{name}" if name else repr(value)
 
 
-def _numbered(stem: str) -> Iterator[str]:
+def _unique_names(stem: str) -> Iterator[str]:
     yield stem
     n = 2
     while True:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from controller.translator.array_views import known_shape
 from controller.translator.calls import Calls
-from controller.translator.operands import Grid, Items, Known, Operand, Value, View
+from controller.translator.operands import Items, Known, LazyArray, Operand, Value, View
 from controller.translator.types import (
     BOOL,
     DOUBLE,
@@ -20,7 +20,7 @@ from controller.translator.types import (
     Tuple,
     Type,
     name_of,
-    returned,
+    return_type,
 )
 
 
@@ -93,9 +93,9 @@ class Statements(Calls):
         if isinstance(value.type, Record) or (isinstance(value.type, Tuple) and _holds_array(value.type)):
             self.fail(node, f"{name_of(value.type)} that is returned")
         self.result = value.type if isinstance(self.result, Nothing) else self.unify(self.result, value.type, node)
-        self.lines.append(f"return {self._as(value, self.result, node)};")
+        self.lines.append(f"return {self._code_as(value, self.result, node)};")
 
-    def _return_array(self, grid: Grid, node: ast.Return) -> None:
+    def _return_array(self, grid: LazyArray, node: ast.Return) -> None:
         """Return an array by value, as a tuple of its numbers."""
         shape = known_shape(grid.sizes)
         if shape is None or grid.item != DOUBLE:
@@ -105,16 +105,18 @@ class Statements(Calls):
         if self.result != kind:
             self.fail(node, "arrays of two shapes that are returned")
         name = self.new_name("result")
-        self.declared[name] = f"{self.c(returned(kind))} {name};"
-        self.store(self.stored(f"{name}.f", DOUBLE, shape), grid, node)
+        self.declared[name] = f"{self.c(return_type(kind))} {name};"
+        self.store(self.view_of_storage(f"{name}.f", DOUBLE, shape), grid, node)
         self.lines.append(f"return {name};")
 
-    def _as(self, value: Value, kind: Type, node: ast.AST) -> str:
+    def _code_as(self, value: Value, kind: Type, node: ast.AST) -> str:
         """Return a value's C expression, converted to a type that holds it."""
         if isinstance(kind, Tuple) and value.type != kind:
             items = [self.value(item, node) for item in self.items_of(value, node)]
-            return self.compound(kind, [self._as(v, k, node) for v, k in zip(items, kind.items, strict=True)])
-        return self.converted(value, kind)
+            return self.tuple_expression(
+                kind, [self._code_as(v, k, node) for v, k in zip(items, kind.items, strict=True)]
+            )
+        return self.convert(value, kind)
 
     def _do_annassign(self, node: ast.AnnAssign) -> None:
         if node.value is not None:
@@ -122,8 +124,8 @@ class Statements(Calls):
 
     def _do_assign(self, node: ast.Assign) -> None:
         value = self.expression(node.value)
-        if len(node.targets) > 1 and isinstance(value, Grid):
-            value = self.materialized(value, node)
+        if len(node.targets) > 1 and isinstance(value, LazyArray):
+            value = self.materialize(value, node)
         elif len(node.targets) > 1 and isinstance(value, Value) and not value.simple:
             value = self.new_variable(value.type, value.code, value)
         for target in node.targets:
@@ -135,29 +137,29 @@ class Statements(Calls):
             if len(items) != len(target.elts):
                 self.fail(node, f"{len(items)} items for {len(target.elts)} names")
             if isinstance(operand, Items | View):  # all are computed before any is written
-                items = [self._fixed(item, element) for item, element in zip(items, target.elts, strict=True)]
+                items = [self._store_items(item, element) for item, element in zip(items, target.elts, strict=True)]
             for element, item in zip(target.elts, items, strict=True):
                 self._assign(element, item, node)
         elif isinstance(target, ast.Name):
-            self._name_it(target.id, operand, node)
+            self._bind(target.id, operand, node)
         elif isinstance(target, ast.Subscript | ast.Attribute):
             self._write(target, operand, node)
         else:
             self.fail(node, f"a value for {type(target).__name__}")
 
-    def _fixed(self, operand: Operand, target: ast.expr) -> Operand:
+    def _store_items(self, operand: Operand, target: ast.expr) -> Operand:
         if isinstance(operand, Items):
-            return Items(tuple(self._fixed(item, target) for item in operand.items))
-        if isinstance(operand, Grid):
-            return self.materialized(operand, target)
+            return Items(tuple(self._store_items(item, target) for item in operand.items))
+        if isinstance(operand, LazyArray):
+            return self.materialize(operand, target)
         if isinstance(operand, Value) and isinstance(operand.type, Scalar | Array | Record):
             return self.new_variable(operand.type, operand.code, operand)
         return operand
 
-    def _name_it(self, name: str, operand: Operand, node: ast.AST) -> None:
+    def _bind(self, name: str, operand: Operand, node: ast.AST) -> None:
         if name == "_":
             return
-        value = self.materialized(operand, node, name) if isinstance(operand, Grid) else self.value(operand, node)
+        value = self.materialize(operand, node, name) if isinstance(operand, LazyArray) else self.value(operand, node)
         kind = self.unify(self.names[name], value.type, node) if name in self.names else value.type
         if name in self.parameters:
             own = self.names[name]
@@ -173,7 +175,7 @@ class Statements(Calls):
         self.roots[name] = self.roots.get(name, frozenset()) | value.roots
         if isinstance(value, View) and not value.fresh:
             self.check_alias(name, value, node)
-        self.lines.append(f"{self.variable(name)} = {self._as(value, kind, node)};")
+        self.lines.append(f"{self.variable(name)} = {self._code_as(value, kind, node)};")
 
     def _target(self, target: ast.Subscript | ast.Attribute) -> Value:
         """Return the element, array or field that is written."""
@@ -202,14 +204,14 @@ class Statements(Calls):
 
     def _write(self, target: ast.Subscript | ast.Attribute, operand: Operand, node: ast.AST) -> None:
         value = operand if self.is_array(operand) else self.value(operand, node)
-        lvalue, needed, writes = self.evaluate_apart(self._target, target)
+        lvalue, needed, writes = self.evaluate_separately(self._target, target)
         if needed and not (isinstance(value, Value) and value.simple):  # the value is computed first
-            value = self.kept(value, node, writes)
+            value = self.freeze(value, node, writes)
         self.lines += needed
         if isinstance(lvalue, View):
             self.store(lvalue, value, node)
         else:
-            self.lines.append(f"{lvalue.code} = {self.converted(self.scalar(value, node), lvalue.type)};")
+            self.lines.append(f"{lvalue.code} = {self.convert(self.scalar(value, node), lvalue.type)};")
 
     def _do_augassign(self, node: ast.AugAssign) -> None:
         target = node.target
@@ -217,17 +219,17 @@ class Statements(Calls):
             old = self.expression(ast.copy_location(ast.Name(target.id, ast.Load()), node))
         else:
             old = self._target(target)
-        other, needed, _ = self.evaluate_apart(self.expression, node.value)
+        other, needed, _ = self.evaluate_separately(self.expression, node.value)
         target_value = self.value(old, node)
         before = self.temporary(target_value.type, target_value.code) if needed and not isinstance(old, View) else old
         self.lines += needed
         if isinstance(target_value, View):
             self.store(target_value, other, node, node.op)
         elif isinstance(target, ast.Name):
-            self._name_it(target.id, self.arithmetic(node.op, before, other, node), node)
+            self._bind(target.id, self.arithmetic(node.op, before, other, node), node)
         else:
             value = self.scalar(self.arithmetic(node.op, before, other, node), node)
-            self.lines.append(f"{target_value.code} = {self.converted(value, target_value.type)};")
+            self.lines.append(f"{target_value.code} = {self.convert(value, target_value.type)};")
 
     def _do_if(self, node: ast.If) -> None:
         test = self.expression(node.test)
@@ -248,7 +250,7 @@ class Statements(Calls):
     def _do_while(self, node: ast.While) -> None:
         if node.orelse:
             self.fail(node, "else of a loop")
-        condition, needed, _ = self.evaluate_apart(self.condition, node.test)
+        condition, needed, _ = self.evaluate_separately(self.condition, node.test)
         if needed:
             self.lines += ["for (;;) {", *needed, f"if (!({condition.code})) {{", "break;", "}"]
         else:
@@ -290,7 +292,7 @@ class Statements(Calls):
             self.fail(node, "a step of a loop that is no constant")
         first = self.scalar(operands[0], node).code if len(operands) > 1 else "0"
         last = self.scalar(operands[-1] if len(operands) < 3 else operands[1], node)
-        end = last.code if isinstance(operands[0 if len(operands) == 1 else 1], Known) else self._end(last)
+        end = last.code if isinstance(operands[0 if len(operands) == 1 else 1], Known) else self._loop_end(last)
         name = node.target.id
         counter = self.new_name("i") if name == "_" or _is_written(name, node.body) else ""
         if name != "_":
@@ -307,7 +309,7 @@ class Statements(Calls):
         self._block(node.body)
         self.lines.append("}")
 
-    def _end(self, last: Value) -> str:
+    def _loop_end(self, last: Value) -> str:
         return self.temporary(INT, last.code).code
 
 

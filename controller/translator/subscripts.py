@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from controller.translator.array_views import plus, times
 from controller.translator.expressions import Expressions
-from controller.translator.operands import Grid, Items, Known, Length, Operand, Value, View
+from controller.translator.operands import Items, Known, LazyArray, Length, Operand, Value, View
 from controller.translator.types import INT, Array, Tuple, name_of
 
 
@@ -19,21 +19,21 @@ class Subscripts(Expressions):
     def _subscript(self, node: ast.Subscript) -> Operand:
         owner = self.expression(node.value)
         places = list(node.slice.elts) if isinstance(node.slice, ast.Tuple) else [node.slice]
-        owner = self.materialized(owner, node) if isinstance(owner, Grid) else owner
+        owner = self.materialize(owner, node) if isinstance(owner, LazyArray) else owner
         if isinstance(owner, View):
             return self.element(owner, places, node)
         items = self.items_of(owner, node)
         if not isinstance(node.slice, ast.Slice):
             place = self.expression(node.slice)
             if isinstance(place, Value):
-                return self._computed_item(owner, place, node)
+                return self._item_by_index(owner, place, node)
         if isinstance(node.slice, ast.Slice):
             bounds = (node.slice.lower, node.slice.upper, node.slice.step)
             low, high, step = (None if n is None else self._known_int(n) for n in bounds)
             return Items(tuple(items[low:high:step]))
         return items[self._known_int(node.slice)]
 
-    def _computed_item(self, owner: Operand, place: Value, node: ast.AST) -> Value:
+    def _item_by_index(self, owner: Operand, place: Value, node: ast.AST) -> Value:
         values = self.value(owner, node)
         kind = values.type
         if not isinstance(kind, Tuple) or not kind.uniform or place.type != INT:
@@ -52,7 +52,7 @@ class Subscripts(Expressions):
         assert isinstance(array.type, Array)
         if len(places) > array.type.ndim:
             self.fail(node, f"{len(places)} indices of {name_of(array.type)}")
-        if all(map(_is_whole, places)):
+        if all(map(_is_full_slice, places)):
             return array
         axes: list[int] = []
         terms, sizes, strides, box = [array.offset], [], [], list(array.box)
@@ -82,9 +82,9 @@ class Subscripts(Expressions):
             if size.isdigit() and not -int(size) <= n < int(size):
                 self.fail(node, f"index {n} of an axis of length {size}")
             return str(n) if n >= 0 else str(int(size) + n) if size.isdigit() else f"({size} - {-n})"
-        return self._integer(operand, node)
+        return self._integer_index(operand, node)
 
-    def _integer(self, operand: Operand, node: ast.AST) -> str:
+    def _integer_index(self, operand: Operand, node: ast.AST) -> str:
         value = self.scalar(operand, node)
         if value.type != INT:
             self.fail(node, f"an index of type {name_of(value.type)}")
@@ -107,25 +107,25 @@ class Subscripts(Expressions):
             length, start = self.length(size), low.value or 0
             if length and not (start < 0 and high.value is not None and high.value >= 0):
                 return self._constant_bounds(size, length, start, high.value, node)
-        begin = "0" if low == Known(None) else self._clipped(low, size, node)
-        end = size if high == Known(None) else self._clipped(high, size, node)
+        begin = "0" if low == Known(None) else self._clip(low, size, node)
+        end = size if high == Known(None) else self._clip(high, size, node)
         constant_length = self._constant_length(node) if self.n_writes == n_writes else math.inf
         max_size = min(self.max_size(size), constant_length)
-        return begin, self.bounded(end if begin == "0" else f"max_i64({end} - {begin}, 0)", max_size)
+        return begin, self.note_max_size(end if begin == "0" else f"max_i64({end} - {begin}, 0)", max_size)
 
     def _constant_bounds(self, size: str, length: Length, low: int, high: int | None, node: ast.AST) -> tuple[str, str]:
         """Return the beginning and the length of a slice of an axis of fixed length, which has to be long enough."""
         end = high or 0
         if low >= 0 and (high is None or high < 0):
             self.require(length, ">=", Length("", low - end), node)
-            return str(low), self.longer(size, end - low)
+            return str(low), self.add_to_length(size, end - low)
         number = max(end - low, 0)
         self.require(length, ">=", Length("", max(end, -low) if number else 0), node)
-        return "0" if not number else str(low) if low >= 0 else self.longer(size, low), str(number)
+        return "0" if not number else str(low) if low >= 0 else self.add_to_length(size, low), str(number)
 
-    def _clipped(self, operand: Operand, size: str, node: ast.AST) -> str:
+    def _clip(self, operand: Operand, size: str, node: ast.AST) -> str:
         """Return a bound of a slice in C, within the axis."""
-        index = str(operand.value) if isinstance(operand, Known) else self._integer(operand, node)
+        index = str(operand.value) if isinstance(operand, Known) else self._integer_index(operand, node)
         return self.temporary(INT, f"clipped({index}, {size})").code
 
     def _constant_length(self, node: ast.Slice) -> float:
@@ -138,5 +138,5 @@ class Subscripts(Expressions):
         return math.inf
 
 
-def _is_whole(node: ast.expr) -> bool:
+def _is_full_slice(node: ast.expr) -> bool:
     return isinstance(node, ast.Slice) and node.lower is None and node.upper is None and node.step is None

@@ -114,16 +114,16 @@ def annotated_shapes(owner: Any) -> dict[str, tuple[int | None, ...]]:
     return shapes
 
 
-def shaped(owner: Any, name: str, kind: Type) -> Type:
+def type_with_shape(owner: Any, name: str, kind: Type) -> Type:
     """Return the type of a parameter or field for a value: with the shape of the annotation, which it has to have."""
     if not isinstance(kind, Array):
         return kind
     computed = (n if isinstance(n, MaxLength) else None for n in kind.shape)
-    shape = zip(_annotated(owner, name, kind.shape), computed, strict=True)
+    shape = zip(_annotated_shape(owner, name, kind.shape), computed, strict=True)
     return Array(kind.item, tuple(n if n is not None else m for n, m in shape), kind.contiguous)
 
 
-def _annotated(owner: Any, name: str, shape: Sequence[int | MaxLength | None]) -> tuple[int | None, ...]:
+def _annotated_shape(owner: Any, name: str, shape: Sequence[int | MaxLength | None]) -> tuple[int | None, ...]:
     """Return the shape that an annotation states, which a shape has to fit."""
     expected = annotated_shapes(owner).get(name) or (None,) * len(shape)
     if len(expected) != len(shape) or any(
@@ -137,7 +137,7 @@ def check_shapes(function: Any, arguments: Sequence[Any]) -> None:
     """Check the shapes of arguments against the annotations of a function."""
     for name, argument in zip(function.__code__.co_varnames, arguments, strict=False):
         if isinstance(argument, np.ndarray):
-            _annotated(function, name, argument.shape)
+            _annotated_shape(function, name, argument.shape)
 
 
 def _lengths(shape: Sequence[int | MaxLength | None]) -> str:
@@ -157,7 +157,7 @@ def type_of(value: Any) -> Type:
         for name, item in zip(value._fields, value, strict=True):
             kind = type_of(item)
             if isinstance(kind, Array):
-                kind = replace(kind, shape=_annotated(type(value), name, item.shape))
+                kind = replace(kind, shape=_annotated_shape(type(value), name, item.shape))
             kinds.append(kind)
         return Record(type(value), tuple(kinds))
     elif isinstance(value, float):
@@ -168,7 +168,7 @@ def type_of(value: Any) -> Type:
     raise TypeError(f"argument is {given}, expected a number, a contiguous array of numbers, or a tuple of such")
 
 
-def unified(one: Type, other: Type) -> Type:
+def common_type(one: Type, other: Type) -> Type:
     """Return the type that holds values of both: the wider one of two numbers."""
     if one == other:
         return one
@@ -176,7 +176,7 @@ def unified(one: Type, other: Type) -> Type:
     if isinstance(one, Scalar) and isinstance(other, Scalar) and one in rank and other in rank:
         return max(one, other, key=rank.index)
     if isinstance(one, Tuple) and isinstance(other, Tuple) and len(one.items) == len(other.items):
-        return Tuple(tuple(map(unified, one.items, other.items)))
+        return Tuple(tuple(map(common_type, one.items, other.items)))
     if isinstance(one, Array) and isinstance(other, Array) and (one.item, one.ndim) == (other.item, other.ndim):
         lengths = zip(one.shape, other.shape, strict=True)
         shape = tuple(a if a == b else MaxLength(max(_max_size(a), _max_size(b))) for a, b in lengths)
@@ -184,7 +184,7 @@ def unified(one: Type, other: Type) -> Type:
     raise TypeError(f"{name_of(one)} and {name_of(other)} in the same place")
 
 
-def returned(kind: Type) -> Type:
+def return_type(kind: Type) -> Type:
     """Return the type by which C returns a value: for an array, a tuple of its numbers."""
     return Tuple((kind.item,) * math.prod(known_lengths(kind))) if isinstance(kind, Array) else kind
 

@@ -6,7 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from controller.translator.arguments import words_of
+from controller.translator.arguments import argument_words
 from plant_fmu.compiling.compiler import find_compiler
 from plant_fmu.errors import BuildError
 
@@ -35,7 +35,7 @@ class Called:
 
     def __init__(self, library, arguments):
         self._library, self._arguments = ctypes.CDLL(str(library)), arguments
-        self._entry, self._words = self._library.entry, np.array(words_of(arguments), dtype=np.uint64)
+        self._entry, self._words = self._library.entry, np.array(argument_words(arguments), dtype=np.uint64)
         self._entry.argtypes, self._entry.restype = [ctypes.c_void_p], None
         self._at = self._words.ctypes.data
         check = self._library.entry_check_shapes
