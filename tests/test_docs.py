@@ -14,7 +14,7 @@ PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglo
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_links_have_existing_targets(page):
-    for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
+    for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text()):
         assert target.startswith("http") or (page.parent / target).exists(), target
 
 
@@ -29,7 +29,8 @@ def test_paths_in_the_architecture_page_exist():
 
 def test_files_that_scripts_of_pages_name_exist():
     text = "".join(path.read_text() for path in (ROOT / "cosim/replay/assets").glob("*.js"))
-    assert [ROOT / path for path in re.findall(r"\bcosim/[\w/]+\.py\b", text) if not (ROOT / path).exists()] == []
+    paths = re.findall(r"\bcosim/[\w/]+\.py\b", text)
+    assert paths and all((ROOT / path).exists() for path in paths), paths
 
 
 def test_lines_beside_equations_stand_in_their_files():

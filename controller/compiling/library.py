@@ -35,15 +35,15 @@ first_use = logging.getLogger("controller.compiling.first_use")  # logs at INFO 
 first_use.propagate = False  # only for listeners by its name
 
 PREBUILT = Path(__file__).parents[1] / "prebuilt"  # one folder a platform in a wheel; missing in a checkout
-_MAX_WRITING = 3600.0  # s; no process writes a library for so long
-_OWN = "subreach-functions-"  # beginning of the name of a process's temporary folder
+_STALE_AGE = 3600.0  # s; no process needs so long to write a library
+_TEMP_PREFIX = "subreach-functions-"  # beginning of the name of a process's temporary folder
 _MACHINE = {"amd64": "x86_64", "arm64": "aarch64"}
 _SYSTEM = {"win32": "windows"}
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 
 @functools.cache
-def library_of(text: str) -> ctypes.PyDLL:
+def load_library(text: str) -> ctypes.PyDLL:
     """Return the library of a C text, loaded; it is compiled where neither the package nor the cache has it."""
     return load_libraries([text])[0]
 
@@ -59,7 +59,7 @@ def _find(text: str) -> ctypes.PyDLL | None:
     """Return the library of a text from the package or the cache."""
     for folder in (PREBUILT / _platform(), cache_folder()):
         path = folder / f"{library_name(text)}{_SUFFIX}"
-        if is_trusted(folder) and is_whole(path):
+        if is_trusted(folder) and has_valid_checksum(path):
             with contextlib.suppress(OSError):  # the library may be for another C library
                 return ctypes.PyDLL(str(path))
     return None
@@ -75,7 +75,7 @@ def checksum_path(path: Path) -> Path:
     return path.with_name(f"{path.name}.sha256")
 
 
-def digest_of(library: bytes) -> str:
+def checksum(library: bytes) -> str:
     """Return the checksum of a library's bytes."""
     return hashlib.sha256(library).hexdigest()
 
@@ -91,27 +91,27 @@ def cache_folder() -> Path:
     return Path(platformdirs.user_cache_dir("subreach")) / "functions"
 
 
-def is_whole(path: Path) -> bool:
+def has_valid_checksum(path: Path) -> bool:
     """Return True if a library exists and has its checksum: loading half of one can end the process."""
     try:
         expected, library = checksum_path(path).read_bytes(), path.read_bytes()
     except OSError:
         return False
-    whole = expected == digest_of(library).encode()
-    if not whole:
+    is_valid = expected == checksum(library).encode()
+    if not is_valid:
         log.warning("%s: damaged; compiled anew", path)
-    return whole
+    return is_valid
 
 
 def is_trusted(folder: Path) -> bool:
     """Return True if only the user, or the owner of the package, can write in a folder of libraries."""
     try:
-        about, trusted = folder.stat(), {Path(__file__).stat().st_uid}
+        status, trusted = folder.stat(), {Path(__file__).stat().st_uid}
     except OSError:
         return False
     if os.name != "posix":
         return True
-    if about.st_uid in trusted | {os.geteuid()} and not about.st_mode & stat.S_IWOTH:
+    if status.st_uid in trusted | {os.geteuid()} and not status.st_mode & stat.S_IWOTH:
         return True
     _warn_of_others(folder)
     return False
@@ -129,7 +129,7 @@ def _compiling(text: str) -> Iterator[Callable[[], ctypes.PyDLL]]:
     name = library_name(text)
     first_use.info("compiling %s", name)
     started = time.perf_counter()
-    own = Path(tempfile.mkdtemp(dir=_own_folder()))
+    own = Path(tempfile.mkdtemp(dir=_temporary_folder()))
     source, built = own / f"{name}.c", own / f"{name}{_SUFFIX}"
     source.write_text(text, encoding="utf-8")
     with compiling(source, built) as finish:
@@ -137,12 +137,12 @@ def _compiling(text: str) -> Iterator[Callable[[], ctypes.PyDLL]]:
         def load() -> ctypes.PyDLL:
             finish()
             log.debug("%s: compiled in %.2f s", name, time.perf_counter() - started)
-            return ctypes.PyDLL(str(keep(built, cache_folder())))
+            return ctypes.PyDLL(str(cache_library(built, cache_folder())))
 
         yield load
 
 
-def keep(built: Path, folder: Path) -> Path:
+def cache_library(built: Path, folder: Path) -> Path:
     """Copy a library with its checksum into a folder of the cache, atomically."""
     cached = folder / built.name
     try:
@@ -151,7 +151,7 @@ def keep(built: Path, folder: Path) -> Path:
             return built
         _remove_old_parts(folder)
         library = built.read_bytes()
-        write_atomic(checksum_path(cached), digest_of(library).encode())
+        write_atomic(checksum_path(cached), checksum(library).encode())
         write_atomic(cached, library)
     except OSError as error:
         log.warning("cache %s: %s; compiled for this process alone", folder, error.strerror or error)
@@ -163,7 +163,7 @@ def _remove_old_parts(folder: Path) -> None:
     """Remove what processes that were killed while they wrote have left in the cache, which only its user can write."""
     for part in folder.glob(".*.part"):
         with contextlib.suppress(OSError):
-            if time.time() - part.stat().st_mtime > _MAX_WRITING:
+            if time.time() - part.stat().st_mtime > _STALE_AGE:
                 part.unlink()
 
 
@@ -180,10 +180,10 @@ def write_atomic(path: Path, data: bytes) -> None:
 
 
 @functools.cache
-def _own_folder() -> Path:
+def _temporary_folder() -> Path:
     """Return a temporary folder that is removed with the process, or by a later one if the process is killed."""
     _remove_abandoned(Path(tempfile.gettempdir()))
-    folder = tempfile.mkdtemp(prefix=_OWN)
+    folder = tempfile.mkdtemp(prefix=_TEMP_PREFIX)
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     if fcntl is not None:  # the lock ends with the process, however it ends
         fcntl.flock(os.open(folder, os.O_RDONLY), fcntl.LOCK_SH)
@@ -194,12 +194,12 @@ def _remove_abandoned(parent: Path) -> None:
     """Remove the folders of killed processes of this user."""
     if fcntl is None:
         return
-    for folder in parent.glob(f"{_OWN}*"):
+    for folder in parent.glob(f"{_TEMP_PREFIX}*"):
         with contextlib.suppress(OSError):  # in use, or another process removes it
             descriptor = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW | os.O_DIRECTORY)
             try:
-                about = os.fstat(descriptor)
-                if about.st_uid == os.geteuid() and time.time() - about.st_mtime > _MAX_WRITING:
+                status = os.fstat(descriptor)
+                if status.st_uid == os.geteuid() and time.time() - status.st_mtime > _STALE_AGE:
                     fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
                     shutil.rmtree(folder, ignore_errors=True)
             finally:

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType
 
-from controller.compiling.library import cache_folder, digest_of, is_trusted, write_atomic
+from controller.compiling.library import cache_folder, checksum, is_trusted, write_atomic
 from controller.translator.program import Program, text_of_global
 from controller.translator.types import Type
 
@@ -37,7 +37,7 @@ def c_text_of(function: Callable[..., None], types: tuple[Type, ...]) -> str:
             kept = json.dumps({"modules": digests, "globals": program.globals, "text": text}).encode()
             path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
             if is_trusted(path.parent):
-                write_atomic(path, digest_of(kept).encode() + b"\n" + kept)
+                write_atomic(path, checksum(kept).encode() + b"\n" + kept)
         except OSError as error:
             log.debug("%s: %s", path, error)
     return text
@@ -52,8 +52,8 @@ def _translated(function: Callable[..., None], types: tuple[Type, ...]) -> Progr
 def _read_cached(path: Path) -> str | None:
     """Return a text from the cache; None unless all files and values that it was made from are as they were."""
     try:
-        checksum, _, data = path.read_bytes().partition(b"\n") if is_trusted(path.parent) else (b"", b"", b"")
-        if checksum == digest_of(data).encode():
+        expected, _, data = path.read_bytes().partition(b"\n") if is_trusted(path.parent) else (b"", b"", b"")
+        if expected == checksum(data).encode():
             kept = json.loads(data)
             same_files = all(_digest(name) == digest for name, digest in kept["modules"].items())
             if same_files and all(_current_value(name) == text for name, text in kept["globals"].items()):

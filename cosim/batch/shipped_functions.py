@@ -14,7 +14,7 @@ import numpy as np
 from controller import LAWS
 from controller.compiling.compiler import compile_file
 from controller.compiling.function import c_text
-from controller.compiling.library import checksum_path, digest_of, library_name
+from controller.compiling.library import checksum, checksum_path, library_name
 from controller.laws.deployable.path_planning.planner import empty_plan, search_path
 from controller.laws.deployable.path_planning.search import PathLimits
 from controller.navigation.navigator import navigate
@@ -94,7 +94,7 @@ def _compile(source: Path, folder: Path, platform: Platform, compiler: list[str]
     library = folder / platform.name / f"{source.stem}{platform.suffix}"
     compile_file(source, library, compiler)
     library.with_suffix(".lib").unlink(missing_ok=True)  # import library for linking on Windows
-    checksum_path(library).write_text(digest_of(library.read_bytes()))
+    checksum_path(library).write_text(checksum(library.read_bytes()))
 
 
 def write_sources(folder: Path) -> None:

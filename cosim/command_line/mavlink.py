@@ -95,10 +95,10 @@ def _redraw(lines: Sequence[str]) -> None:
 
 def stream(options: argparse.Namespace) -> int:
     """Run ``cosim mavlink stream``."""
-    from cosim.mavlink.replay import replay
+    from cosim.mavlink.stream_record import stream_record
 
     endpoints, mavlink = links_from(options)
-    done = replay(options.folder, endpoints, mavlink, None if options.rate == math.inf else options.rate)
+    done = stream_record(options.folder, endpoints, mavlink, None if options.rate == math.inf else options.rate)
     say(options, f"{options.folder}: {done.simulated:.1f} s streamed in {done.wall:.1f} s")
     for trouble in done.loss_reports:
         print_status(trouble)

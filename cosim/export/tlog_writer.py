@@ -6,14 +6,14 @@ from pathlib import Path
 
 from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
-from cosim.mavlink.replay import replay
+from cosim.mavlink.stream_record import stream_record
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.options import MavlinkOptions
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
     """Write the file."""
-    done = replay(excerpt.run.folder, [Endpoint("tlog", path.name, path=str(path))], MavlinkOptions(), rate=None)
+    done = stream_record(excerpt.run.folder, [Endpoint("tlog", path.name, path=str(path))], MavlinkOptions(), rate=None)
     if done.loss_reports:
         raise ExportError(f"--to tlog: not all was written: {'; '.join(done.loss_reports)}")
     return [path]

@@ -17,7 +17,7 @@ import numpy as np
 import platformdirs
 from numpy.typing import NDArray
 
-from controller.compiling.library import is_trusted, is_whole, keep
+from controller.compiling.library import cache_library, has_valid_checksum, is_trusted
 from cosim.errors import IdentificationError
 from cosim.simulation.signals import Array
 from plant_fmu.archive import temporary_folder
@@ -141,7 +141,7 @@ def _library(vehicle: Vehicle) -> ctypes.CDLL:
         made_from.update(f"\n{file} {len(text)}\n".encode() + text)
     name = f"{vehicle.name}-{made_from.hexdigest()[:16]}{native_platform().suffix}"
     path = Path(platformdirs.user_cache_dir("subreach")) / "shooting" / name
-    if is_trusted(path.parent) and is_whole(path):
+    if is_trusted(path.parent) and has_valid_checksum(path):
         return ctypes.CDLL(str(path))
     with temporary_folder("subreach-shooting-") as folder:
         for file, text in files.items():
@@ -149,7 +149,7 @@ def _library(vehicle: Vehicle) -> ctypes.CDLL:
         built = folder / name
         sources = [folder / file for file in sorted(files) if file.endswith(".c") and file != _INCLUDED]
         compile_library(compiler, native_platform(), sources, [], built, flags)
-        return ctypes.CDLL(str(keep(built, path.parent)))
+        return ctypes.CDLL(str(cache_library(built, path.parent)))
 
 
 def _machine(compiler: Sequence[str], flags: Sequence[str]) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from controller import LAWS, CompiledLaw, Law
 from controller.compiling.function import INTERPRETED, BoundCall
-from controller.compiling.library import library_of
+from controller.compiling.library import load_library
 from controller.errors import CompilationError, LawError
 from controller.function_law import qualified_name
 from cosim.simulation.signals import Array
@@ -143,7 +143,7 @@ class CompiledRules:
     on_error: Callable[[], None] | None = None
 
     def __init__(self, system: System, inputs: Array, outputs: Array) -> None:
-        entry = library_of(rules_text(system)).entry
+        entry = load_library(rules_text(system)).entry
         words = np.array([inputs.ctypes.data, outputs.ctypes.data], np.uint64)
         self._kept = entry, words, inputs, outputs
         self.address: int = ctypes.cast(entry, ctypes.c_void_p).value or 0

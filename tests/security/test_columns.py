@@ -9,10 +9,9 @@ import pytest
 from cosim.errors import RunError
 from cosim.export import export_run
 from cosim.live.watching import snapshots
-from cosim.mavlink.replay import replay as stream
+from cosim.mavlink.stream_record import stream_record as stream
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.options import MavlinkOptions
-from cosim.replay.pages import replay
 from cosim.results.record import RECORD
 from cosim.results.required_columns import require_columns
 from cosim.run.run_folder import report_again

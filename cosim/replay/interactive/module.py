@@ -7,7 +7,7 @@ from pathlib import Path
 
 import platformdirs
 
-from controller.compiling.library import is_whole, keep
+from controller.compiling.library import cache_library, has_valid_checksum
 from cosim.replay.interactive.flight import Flight
 from cosim.replay.interactive.flight_sources import flight_sources
 from cosim.scenario.scenario import Scenario
@@ -39,11 +39,11 @@ def flight_module(scenario: Scenario) -> FlightModule:
     made_from = {**c_sources(component, 3), component.header: header(component, key).encode(), **sources}
     name = f"{scenario.vehicle.name}-{digest(made_from, *FLAGS)[:32]}.wasm"
     kept = Path(platformdirs.user_cache_dir("subreach")) / "pages" / name
-    if is_whole(kept):
+    if has_valid_checksum(kept):
         return FlightModule(flight, memory, kept.read_bytes())
     binary = module(component, key, sources)
     with temporary_folder("flight-") as scratch:
         built = scratch / name
         built.write_bytes(binary)
-        keep(built, kept.parent)
+        cache_library(built, kept.parent)
     return FlightModule(flight, memory, binary)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from controller.compiling import library, text_cache
-from controller.compiling.library import digest_of, library_name, library_of, load_libraries
+from controller.compiling.library import checksum, library_name, load_libraries, load_library
 from controller.errors import CompilationError
 from controller.translator.types import type_of
 from cosim.step.decision import bound_wrench
@@ -26,7 +26,7 @@ def cache(tmp_path, monkeypatch):
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: str(tmp_path / name))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # for other processes
     yield tmp_path / "subreach" / "functions"
-    library_of.cache_clear()
+    load_library.cache_clear()
 
 
 @pytest.fixture
@@ -43,8 +43,8 @@ def compiled(monkeypatch):
 
 
 def answer(text=TEXT):
-    library_of.cache_clear()
-    return library_of(text).answer()
+    load_library.cache_clear()
+    return load_library(text).answer()
 
 
 def test_compiled_library_is_cached_by_its_text(cache, compiled):
@@ -119,12 +119,12 @@ def test_missing_compiler_error_names_alternatives(monkeypatch):
     monkeypatch.setenv("PATH", "/nowhere")
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(CompilationError, match="neither cc nor the ziglang package was found"):
-        library_of("none")
+        load_library("none")
 
 
 def test_compilation_error_quotes_first_compiler_error(cache):
     with pytest.raises(CompilationError, match=r"error: .*unknown"):
-        library_of("unknown answer;\n")
+        load_library("unknown answer;\n")
 
 
 COMPILER = """
@@ -206,14 +206,14 @@ def test_an_error_stops_all_compilers(cache, tmp_path, waiting_compiler, error):
 
 @pytest.mark.medium
 def test_processes_that_compile_the_same_at_once_leave_one_whole_library(cache):
-    code = f"from controller.compiling.library import library_of; print(library_of({TEXT!r}).answer())"
+    code = f"from controller.compiling.library import load_library; print(load_library({TEXT!r}).answer())"
     several = [
         subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         for _ in range(3)
     ]
     assert [process.communicate(timeout=120) for process in several] == [("42\n", "")] * 3
     (path,) = cache.glob("*.so")
-    assert ctypes.CDLL(str(path)).answer() == 42 and library.is_whole(path)
+    assert ctypes.CDLL(str(path)).answer() == 42 and library.has_valid_checksum(path)
     assert len(list(cache.iterdir())) == 2
 
 
@@ -223,7 +223,7 @@ def test_what_a_killed_process_left_in_the_cache_is_removed_once_it_is_old(cache
     for name, age in (("old", 2.0), ("young", 0.5)):
         part = cache / f".{name}.part"
         part.write_bytes(b"half")
-        then = time.time() - age * library._MAX_WRITING
+        then = time.time() - age * library._STALE_AGE
         os.utime(part, (then, then))
     answer(TEXT.replace("42", "43"))
     assert [path.name for path in cache.glob(".*")] == [".young.part"]
@@ -234,7 +234,9 @@ def test_what_a_killed_process_left_in_the_cache_is_removed_once_it_is_old(cache
 def test_temporary_folder_of_a_killed_process_is_removed_by_a_later_one(tmp_path, killed):
     """Once it is old; that of a process which still runs, and folders of others, stay."""
     environment = os.environ | {"TMPDIR": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
-    script = "from controller.compiling.library import _own_folder; print(_own_folder(), flush=True); input()"
+    script = (
+        "from controller.compiling.library import _temporary_folder; print(_temporary_folder(), flush=True); input()"
+    )
 
     def begin():
         process = subprocess.Popen(
@@ -248,7 +250,7 @@ def test_temporary_folder_of_a_killed_process_is_removed_by_a_later_one(tmp_path
     if killed:
         first.kill()
         first.communicate(timeout=60)
-    long_ago = time.time() - 2.0 * library._MAX_WRITING
+    long_ago = time.time() - 2.0 * library._STALE_AGE
     for path in (folder, other):
         os.utime(path, (long_ago, long_ago))
     second, own = begin()
@@ -290,7 +292,7 @@ def test_a_damaged_text_is_made_anew(damage, cache):
     damaged = {
         "half": whole[: len(whole) // 2],
         "changed": whole.replace(b"bound_wrench", b"bound_trench"),
-        "older": digest_of(b"{}").encode() + b"\n{}",
+        "older": checksum(b"{}").encode() + b"\n{}",
     }
     path.write_bytes(damaged[damage])
     assert text_cache.c_text_of(bound_wrench, kind) == plain

@@ -9,7 +9,7 @@ import pytest
 
 from controller import LAWS
 from controller.compiling.function import BoundCall, c_text
-from controller.compiling.library import library_of
+from controller.compiling.library import load_library
 from controller.stack_array import interpret
 from tests.controller.translator.building import Called, compiled
 from tests.controller.translator.flights import Flight, same_bits
@@ -81,7 +81,7 @@ def test_another_compiler_gives_the_same_bits(library, tmp_path):
 @pytest.mark.parametrize("law", sorted(LAWS))
 def test_generated_code_allocates_no_heap_memory(law):
     flight = Flight(law)
-    built = library_of(c_text(flight.function, flight.arguments))._name
+    built = load_library(c_text(flight.function, flight.arguments))._name
     done = subprocess.run(["nm", "-D", "--undefined-only", built], capture_output=True, text=True, check=False)
     if done.returncode:
         pytest.skip("nm is not there")

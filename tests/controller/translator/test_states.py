@@ -142,7 +142,6 @@ def test_random_statements_have_the_same_bits_in_c(seed, tmp_path):
         call()
         interpret(function, expected)
         assert same_bits(given, expected)
-    assert np.isfinite(given[0].v).all()
 
 
 def defaults(s, out):

@@ -214,7 +214,9 @@ def test_missing_item_is_requested_again_until_timeout(station):
 
 
 def test_upload_can_be_canceled(station):
-    station.play(COUNT(1, 1, 3, 0), message("MISSION_ACK", 1, type=mavlink.MAV_MISSION_OPERATION_CANCELLED))
+    station.play(COUNT(1, 1, 3, 0))
+    assert station.wire.of("MISSION_REQUEST_INT")
+    station.play(message("MISSION_ACK", 1, type=mavlink.MAV_MISSION_OPERATION_CANCELLED))
     station.wire.clear()
     station.wait(3.0, 0.5)
     assert station.wire.of("MISSION_REQUEST_INT") == []

@@ -45,9 +45,9 @@ def test_cached_function_announces_no_compilation(monkeypatch, tmp_path):
     text = "void entry(const void *words);\nvoid entry(const void *words) { (void)words; }\n"
     notices = []
     for expected in ([COMPILING_NOTICE], [COMPILING_NOTICE, COMPILING_NOTICE][:1]):
-        library.library_of.cache_clear()
+        library.load_library.cache_clear()
         with announce_compilation(notices.append):
-            library.library_of(text)
+            library.load_library(text)
         assert notices == expected
 
 

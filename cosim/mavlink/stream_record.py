@@ -1,4 +1,4 @@
-"""A recorded run as a MAVLink vehicle: the same autopilot and links, with the record as input."""
+"""Stream a recorded run over MAVLink as if it were running."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MAX_QUEUED = MAX_SNAPSHOTS // 2
 
 
 @dataclass(frozen=True)
-class ReplayResult:
+class StreamResult:
     """Result of streaming a record."""
 
     simulated: float  # s
@@ -34,9 +34,9 @@ class ReplayResult:
     loss_reports: list[str]  # texts about lost or refused frames
 
 
-def replay(
+def stream_record(
     folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions, rate: float | None = 1.0
-) -> ReplayResult:
+) -> StreamResult:
     """Stream a recorded run as a running vehicle that accepts no commands."""
     if not (folder / SCENARIO).is_file():
         raise RunError(f"{folder}: holds no run ({SCENARIO} is missing)")
@@ -60,7 +60,7 @@ def replay(
         thread.await_queue(0)
     finally:
         thread.close()
-    return ReplayResult(simulated, time.perf_counter() - started, thread.loss_reports())
+    return StreamResult(simulated, time.perf_counter() - started, thread.loss_reports())
 
 
 def _rows(record: Record, every: int, names: Sequence[str]) -> Iterator[tuple[int, Array]]:

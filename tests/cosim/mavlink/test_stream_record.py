@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.command_line.cli import main
 from cosim.errors import RunError
-from cosim.mavlink.replay import replay
+from cosim.mavlink.stream_record import stream_record
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.results.record import load_record
@@ -23,7 +23,7 @@ OVERRIDES = ("arbiter.engine=closed", "time.duration=4")
 
 def replayed(folder, log, **options):
     """Stream a run into a log; return the result, and the messages."""
-    result = replay(folder, [parse_endpoint(str(log))], MavlinkOptions(**options), rate=None)
+    result = stream_record(folder, [parse_endpoint(str(log))], MavlinkOptions(**options), rate=None)
     return result, read_log(log)
 
 
@@ -78,7 +78,9 @@ def test_killed_run_is_streamed_to_its_last_row(recorded, tmp_path):
 def test_streaming_over_udp_answers_requests_and_rejects_commands(recorded):
     done = []
     with GroundStation() as station:
-        thread = threading.Thread(target=lambda: done.append(replay(recorded, [station.endpoint], MavlinkOptions())))
+        thread = threading.Thread(
+            target=lambda: done.append(stream_record(recorded, [station.endpoint], MavlinkOptions()))
+        )
         thread.start()
         station.connect()
         assert station.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM).result == mavlink.MAV_RESULT_DENIED
