@@ -9,9 +9,10 @@ import pytest
 from cosim.errors import RunError
 from cosim.export import export_run
 from cosim.live.watching import snapshots
-from cosim.mavlink.stream_record import stream_record as stream
+from cosim.mavlink.stream_record import stream_record
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.replay.pages import replay
 from cosim.results.record import RECORD
 from cosim.results.required_columns import require_columns
 from cosim.run.run_folder import report_again
@@ -40,7 +41,7 @@ READERS = {
     "export csv": lambda folder: export_run(folder, "csv", folder / "it.csv"),
     "export mcap": lambda folder: export_run(folder, "mcap", folder / "it.mcap"),
     "export tlog": lambda folder: export_run(folder, "tlog", folder / "it.tlog"),
-    "stream": lambda folder: stream(
+    "stream": lambda folder: stream_record(
         folder, [parse_endpoint(str(folder / "own.tlog"))], MavlinkOptions(), None
     ),
 }  # fmt: skip
