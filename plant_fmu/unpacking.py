@@ -126,7 +126,7 @@ def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
         raise FmuFileError(
             f"{path}: refused: {packed} bytes become {size} when extracted, expected at most {MAX_RATIO} times as many"
         )
-    names: dict[str, str] = {}
+    known: dict[str, zipfile.ZipInfo] = {}
     for member in members:
         name = member.orig_filename
         if len(name) > MAX_NAME:
@@ -137,11 +137,19 @@ def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
         if not name.isprintable():
             raise FmuFileError(f"{path}: refused: {name!r} is no name of a file")
         key = _file_key(name)
-        if key in names and not (name.endswith("/") and names[key].endswith("/")):  # a folder may be named twice
-            raise FmuFileError(f"{path}: refused: {name!r} would be written over {names[key]!r}")
-        names[key] = name
+        if key in known and not _is_same(archive, member, known[key]):
+            raise FmuFileError(f"{path}: refused: {name!r} would be written over {known[key].orig_filename!r}")
+        known[key] = member
         if member.compress_type not in _METHODS:
             raise FmuFileError(f"{path}: refused: {name!r} is neither stored nor deflated")
+
+
+def _is_same(archive: zipfile.ZipFile, a: zipfile.ZipInfo, b: zipfile.ZipInfo) -> bool:
+    """Return True for two folders, and for one file that is in the archive twice."""
+    if a.is_dir() or b.is_dir():
+        return a.is_dir() and b.is_dir()
+    same = (a.orig_filename, a.CRC, a.file_size) == (b.orig_filename, b.CRC, b.file_size)
+    return same and archive.read(a) == archive.read(b)
 
 
 def _file_key(name: str) -> str:

@@ -13,7 +13,7 @@ from controller.translator.foreign import BOOL, DOUBLE, INT, POINTER, SIZE, call
 from plant_fmu.running.native import Native
 
 _WARNING = 1  # the highest status that is not a failure
-_ENDED = 1  # index of terminateSimulation in the results of fmi3DoStep
+_ENDED, _STATUS = 1, 4  # indices of terminateSimulation, and of the status, in the results of fmi3DoStep
 
 # arguments of the C functions
 _TRANSFER = (POINTER, POINTER, SIZE, POINTER, SIZE)  # fmi3SetFloat64, fmi3GetFloat64
@@ -65,6 +65,7 @@ def fmi_do_step(native: Native, now: float, step: float) -> bool:
     if native.do_step == 0:
         return True
     status = call_c(native.do_step, _DO_STEP, native.instance, now, step, True, out, out[1:], out[2:], out[3:])
+    out[_STATUS] = status
     return status <= _WARNING and out[_ENDED] == 0
 
 

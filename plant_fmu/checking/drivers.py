@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import fmpy
+from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi3 import FMU3Slave
 from fmpy.model_description import ValidationError
-from fmpy.simulation import instantiate_fmu
 
 from plant_fmu.checking.fmu_file import FmuFile
 from plant_fmu.checking.task import Task
@@ -103,8 +104,11 @@ class _Slave:
         self._fmi = fmu.fmi
         self._references = {v.name: v.reference for v in fmu.variables}
         self._outputs = {v.name: v.reference for v in fmu.with_causality("output")}
-        description = fmpy.read_model_description(str(folder), validate=False)
-        self.instance = instantiate_fmu(str(folder), description, "CoSimulation")
+        kind, identifier = FMU2Slave if fmu.fmi == 2 else FMU3Slave, fmu.interfaces["CS"]["modelIdentifier"]
+        self.instance = kind(
+            guid=fmu.token, unzipDirectory=str(folder), modelIdentifier=identifier, instanceName=identifier
+        )
+        self.instance.instantiate()
 
     def initialize(self, start: Mapping[str, float], stop_time: float) -> None:
         """Initialize at time 0 with start values, and pass the stop time [s] to the FMU."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import sys
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from plant_fmu.model_variables import ModelVariable
 from plant_fmu.running.instance import Instance
 
 DOUBLES = ("Real", "Float64")
@@ -48,7 +50,7 @@ class BoundCalls:
     def __init__(self, instance: Instance, brief: bool = False) -> None:
         # a call that releases the lock wakes every thread that waits for it, mostly to find it taken again
         self._library = ctypes.PyDLL(None, handle=instance.fmu.dll._handle) if brief else instance.fmu.dll
-        scalars = [v for v in instance.variables.values() if not v.dimensions]
+        scalars = [v for v in instance.variables.values() if not v.shape]
         inputs = [v for v in scalars if v.causality == "input" and v.type in DOUBLES]
         outputs = [v for v in scalars if v.causality == "output" and v.type in DOUBLES]
         flags = [v for v in scalars if v.causality == "output" and v.type == "Boolean"]
@@ -63,7 +65,9 @@ class BoundCalls:
 
         # length: arguments of `do_step` [s]
         # now: arguments of `do_step` [s]
-        self.now, self.length, self.ended = ctypes.c_double(), ctypes.c_double(), ctypes.c_bool()
+        self.now, self.length = ctypes.c_double(), ctypes.c_double()
+        # results of `do_step`, of FMI 3.0 alone; last: time up to which it stepped [s], NaN if it does not say
+        self.ended, self.last = ctypes.c_bool(), ctypes.c_double(math.nan)
         if instance.fmi == 2:
             names = ("fmi2SetReal", "fmi2GetReal", "fmi2GetBoolean")
         else:
@@ -75,19 +79,17 @@ class BoundCalls:
 
     def _step_call(self, instance: Instance) -> Call:
         component = ctypes.c_void_p(instance.fmu.component)
-        # an FMU without save and restore may discard the state before a step
-        no_rollback = "state" not in instance.capabilities
         if instance.fmi == 2:
-            return self._library["fmi2DoStep"], (component, self.now, self.length, ctypes.c_int(no_rollback))
-        event, early, last = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_double()
-        results = [ctypes.byref(result) for result in (event, self.ended, early, last)]
-        return self._library["fmi3DoStep"], (component, self.now, self.length, ctypes.c_bool(no_rollback), *results)
+            return self._library["fmi2DoStep"], (component, self.now, self.length, instance.no_rollback)
+        event, early = ctypes.c_bool(), ctypes.c_bool()
+        results = [ctypes.byref(result) for result in (event, self.ended, early, self.last)]
+        return self._library["fmi3DoStep"], (component, self.now, self.length, instance.no_rollback, *results)
 
-    def _values_call(self, instance: Instance, name: str, variables: list[Any], buffer: Any) -> Call:
+    def _values_call(self, instance: Instance, name: str, variables: list[ModelVariable], buffer: Any) -> Call:
         if not variables:  # some FMUs refuse a call without variables
             return _no_call, ()
         n = ctypes.c_size_t(len(variables))
-        references = (ctypes.c_uint * len(variables))(*(v.valueReference for v in variables))
+        references = (ctypes.c_uint * len(variables))(*(v.reference for v in variables))
         arguments: tuple[Any, ...] = (ctypes.c_void_p(instance.fmu.component), references, n, buffer)
         # a function looked up with [] is an object of its own, without FMPy's conversion of each argument
         return self._library[name], arguments if instance.fmi == 2 else (*arguments, n)
@@ -109,8 +111,8 @@ def _as_bools(buffer: Any, size: int) -> NDArray[np.bool_]:
     return np.frombuffer(buffer, np.bool_)[0 if sys.byteorder == "little" else size - 1 :: size]
 
 
-def _make_channels(variables: list[Any]) -> tuple[Channel, ...]:
-    return tuple(Channel(v.name, v.unit or "", v.description or "") for v in variables)
+def _make_channels(variables: list[ModelVariable]) -> tuple[Channel, ...]:
+    return tuple(Channel(v.name, v.unit, v.description) for v in variables)
 
 
 def _read_only(values: NDArray[Any]) -> NDArray[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import math
 import warnings
@@ -10,15 +11,21 @@ from pathlib import Path
 from typing import Any, NoReturn, Self
 
 import numpy as np
+from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
 from numpy.typing import NDArray
 
 from plant_fmu.errors import PlantError
+from plant_fmu.model_variables import ModelVariable
 from plant_fmu.running.channels import DOUBLES, BoundCalls
-from plant_fmu.running.instance import WARNING, Instance
+from plant_fmu.running.instance import Instance
+from plant_fmu.running.messages import WARNING
 from plant_fmu.running.state import Clock
-from plant_fmu.running.values import Value, convert_value, require_settable
+from plant_fmu.running.values import Value, convert_value, convert_values, require_settable
 
 _MAX_STEP = 1e9  # s, bound of a step
+_DISCARD = 2  # status of FMI 2.0 and 3.0
+_ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
+_ENDS = "the FMU requests the end of the simulation"
 _AT_ZERO = Clock(0.0, 0, math.nan)
 _FORMER_NAMES = {
     "initialise": "initialize", "initialised": "initialized", "serialise": "serialize", "deserialise": "deserialize",
@@ -39,7 +46,8 @@ class CoSimulationInstance:
         self._input_index = {name: i for i, name in enumerate(self.inputs.names)}
         self._output_index = {name: i for i, name in enumerate(self.outputs.names)}
         self._calls = (*bound.set_inputs, *bound.do_step, *bound.get_outputs)
-        self._now, self._ended = bound.now, bound.ended
+        self._now, self._ended, self._last = bound.now, bound.ended, bound.last
+        self._terminated = False
         self._set_clock(_AT_ZERO, initialized=False)
 
     def __getattr__(self, name: str) -> Any:
@@ -80,19 +88,21 @@ class CoSimulationInstance:
     def set(self, values: Mapping[str, Value]) -> None:
         """Set parameters, inputs or start values by name."""
         self._require_open()
-        batches: dict[str, tuple[list[Any], list[Value]]] = {}
+        batches: dict[str, tuple[list[ModelVariable], list[Value]]] = {}
         for name, value in values.items():
             variable = self._variable(name)
             require_settable(variable, self.initialized)
             variables, numbers = batches.setdefault(variable.type, ([], []))
             variables.append(variable)
-            numbers.append(convert_value(variable, value))
+            numbers.extend(convert_values(variable, value))
         # real numbers go last, in one call, of which the FMU takes all or none
         for _, (variables, numbers) in sorted(batches.items(), key=lambda batch: batch[0] in DOUBLES):
             self._instance.set(variables, numbers)
-            for variable, number in zip(variables, numbers, strict=True):
+            for variable in variables:
                 if variable.name in self._input_index:
-                    self.inputs.values[self._input_index[variable.name]] = number
+                    self.inputs.values[self._input_index[variable.name]] = convert_value(
+                        variable, values[variable.name]
+                    )
         if self.initialized:
             self._read()
 
@@ -103,7 +113,7 @@ class CoSimulationInstance:
         else:
             self.set({name: value})
 
-    def __getitem__(self, name: str) -> Value:
+    def __getitem__(self, name: str) -> Any:
         self._require_open()
         if name in self._input_index:
             return float(self.inputs.values[self._input_index[name]])
@@ -112,13 +122,12 @@ class CoSimulationInstance:
             raise PlantError(f"{name} has no value before initialize()")
         if name in self._output_index:
             return float(self.outputs.values[self._output_index[name]])
-        if variable.dimensions or variable.type in ("Binary", "Clock"):
-            kind = "an array" if variable.dimensions else f"of type {variable.type}"
-            raise PlantError(f"{name} is {kind}, expected a scalar number, Boolean or text")
+        if variable.type in ("Binary", "Clock"):
+            raise PlantError(f"{name} is of type {variable.type}, expected a number, Boolean or text")
         value: Value = self._instance.get(variable)
         return value
 
-    def _variable(self, name: str) -> Any:
+    def _variable(self, name: str) -> ModelVariable:
         known = self._instance.variables
         if name not in known:
             matches = difflib.get_close_matches(str(name), known, n=1)
@@ -131,40 +140,58 @@ class CoSimulationInstance:
     def _require_open(self) -> None:
         if self._instance.closed:
             raise PlantError(f"plant {self.name} is closed")
+        if self._instance.life.fatal:
+            raise PlantError(f"plant {self.name} has failed fatally, and can only be closed")
 
     def _require_initialized(self, action: str) -> None:
         self._require_open()
         if not self.initialized:
-            raise PlantError(f"plant {self.name} {action} before initialize()")
+            when = "after terminate(), until reset()" if self._terminated else "before initialize()"
+            raise PlantError(f"plant {self.name} {action} {when}")
 
     # ---- life cycle ----
 
-    def initialize(self, time: float = 0.0) -> None:
-        """Initialize the FMU, and read the outputs; time [s]."""
+    def initialize(self, time: float = 0.0, stop_time: float | None = None, tolerance: float | None = None) -> None:
+        """Initialize the FMU, and read the outputs; time [s], stop_time [s], relative tolerance of its solver."""
         self._require_open()
         if self.initialized:
             raise PlantError(f"plant {self.name} is initialized already; reset() it first")
-        if not isinstance(time, (int, float, np.integer, np.floating)):
-            raise PlantError(f"start time is {time!r}, expected seconds")
-        time = float(time)
+        if self._terminated:
+            raise PlantError(f"plant {self.name} is terminated; reset() it first")
+        time = _number("start time", time, "seconds")
+        if stop_time is not None and _number("stop time", stop_time, "seconds") < time:
+            raise PlantError(f"stop time is {stop_time} s, expected {time} s (start time) or later")
+        if tolerance is not None and not _number("tolerance", tolerance, "a number") > 0.0:
+            raise PlantError(f"tolerance is {tolerance}, expected a number above 0")
+        experiment = {"startTime": time, "stopTime": stop_time, "tolerance": tolerance}
         instance, fmu = self._instance, self._instance.fmu
         self._send()
         try:
             if instance.fmi == 2:
-                instance.do(fmu.setupExperiment, startTime=time)
+                instance.do(fmu.setupExperiment, **experiment)
                 instance.do(fmu.enterInitializationMode)
             else:
-                instance.do(fmu.enterInitializationMode, startTime=time)
+                instance.do(fmu.enterInitializationMode, **experiment)
             instance.do(fmu.exitInitializationMode)
         except PlantError as error:
             raise PlantError(f"{error}; reset(), then set valid values") from error
+        instance.life.running = True
         self._set_clock(Clock(time, 0, math.nan), initialized=True)
         self._read()
+
+    def terminate(self) -> None:
+        """End the simulation. Afterwards the plant can be reset or closed; `close` terminates too."""
+        self._require_initialized("cannot be terminated")
+        self._instance.life.running = False
+        self._terminated = True
+        self._set_clock(Clock(self.time, 0, math.nan), initialized=False)
+        self._instance.do(self._instance.fmu.terminate)
 
     def reset(self) -> None:
         """Return to the state after loading: start values of the FMU, not initialized, time 0."""
         self._require_open()
         self._instance.do(self._instance.fmu.reset)
+        self._instance.life.running = self._terminated = False
         self._instance.messages.take_failures()  # so that a later error does not quote earlier messages
         self.inputs.values[:] = self._bound.starts
         self._set_clock(_AT_ZERO, initialized=False)
@@ -175,14 +202,19 @@ class CoSimulationInstance:
             self._change_step(step)
         set_inputs, input_arguments, do_step, step_arguments, get_outputs, output_arguments = self._calls
         self._now.value = self.time
-        if set_inputs(*input_arguments) > WARNING or do_step(*step_arguments) > WARNING:
-            raise PlantError(f"t = {self.time:.6g} s: {self._failure_message()}")
+        if (status := set_inputs(*input_arguments)) > WARNING:
+            self._fail(status)
+        self._ended.value = False  # some FMUs do not write their results
+        if (status := do_step(*step_arguments)) > WARNING:
+            self._fail_step(status)
         self._count = count = self._count + 1
         self.time = self._start + count * self._step
-        if get_outputs(*output_arguments) > WARNING:
-            raise PlantError(f"t = {self.time:.6g} s: {self._failure_message()}")
+        if self._last.value < self.time - _ROUNDING * self._step:
+            self._stop_early(self._last.value, "made a part of the step alone")
+        if (status := get_outputs(*output_arguments)) > WARNING:
+            self._fail(status)
         if self._ended.value:
-            raise PlantError(f"t = {self.time:.6g} s: the FMU requests the end of the simulation")
+            raise PlantError(f"t = {self.time:.6g} s: {_ENDS}")
 
     def prepare_steps(self, step: float) -> None:
         """Prepare steps of `step` seconds by the functions of `native_channels`."""
@@ -195,10 +227,39 @@ class CoSimulationInstance:
         self._count += n
         self.time = self._start + self._count * self._step
 
-    def raise_failure(self, ended: bool = False) -> NoReturn:
-        """Raise the error of a step that the functions of `native_channels` failed in, or after which the FMU ends."""
+    def raise_failure(self, results: NDArray[np.int64]) -> NoReturn:
+        """Raise the error of a step by the functions of `native_channels`, or that the FMU ends after it."""
+        ended, status = bool(results[1]), int(results[4])
         self.count_steps(int(ended))
-        reason = "the FMU requests the end of the simulation" if ended else self._failure_message()
+        if ended:
+            raise PlantError(f"t = {self.time:.6g} s: {_ENDS}")
+        self._fail(status)
+
+    def _fail(self, status: int) -> NoReturn:
+        """Raise the error of a call in a step; the next step checks whether there can be one."""
+        self._step = math.nan
+        self._instance.life.note(status)
+        raise PlantError(f"t = {self.time:.6g} s: {self._failure_message()}")
+
+    def _fail_step(self, status: int) -> NoReturn:
+        """Raise the error of `doStep`: an FMU that discards a step may have made a part of it, and may have ended."""
+        if status != _DISCARD:
+            self._fail(status)
+        ended, last, fmu = self._ended.value, self._last.value, self._instance.fmu
+        if self.fmi == 2:
+            with contextlib.suppress(Exception):  # not all FMUs have the functions
+                last = fmu.getRealStatus(fmi2LastSuccessfulTime)
+            with contextlib.suppress(Exception):
+                ended = fmu.getBooleanStatus(fmi2Terminated)
+        self._stop_early(last, _ENDS if ended else self._instance.messages.take_failures() or "discarded the step")
+
+    def _stop_early(self, last: float, reason: str) -> NoReturn:
+        """Set the clock to the last time that the FMU reached, if it says so, and raise an error."""
+        last = last if self._now.value <= last <= self._now.value + self._step else self._now.value
+        self._set_clock(Clock(last, 0, self._last_step), initialized=True)
+        with contextlib.suppress(PlantError):
+            self._read()
+        reason = reason if reason.startswith("the FMU") else f"the FMU {reason}"
         raise PlantError(f"t = {self.time:.6g} s: {reason}")
 
     def _change_step(self, step: float) -> None:
@@ -207,9 +268,20 @@ class CoSimulationInstance:
         number = isinstance(step, (int, float, np.integer, np.floating)) and not isinstance(step, bool)
         if not (number and 0.0 < step < _MAX_STEP):
             raise PlantError(f"step is {step!r}, expected seconds above 0")
+        self._require_allowed(float(step))
         if step != self._last_step:
             self._start, self._count = self.time, 0
         self._step = self._last_step = self._bound.length.value = float(step)
+
+    def _require_allowed(self, step: float) -> None:
+        """Raise an error for a step that the FMU declares that it cannot make."""
+        fixed, last = self._instance.fixed_step, self._last_step
+        if not math.isnan(fixed) and not abs(step - round(step / fixed) * fixed) <= _ROUNDING * fixed:
+            raise PlantError(f"step is {step} s, expected a multiple of the FMU's fixedInternalStepSize of {fixed} s")
+        if "varying step" not in self._instance.capabilities and abs(step - last) > _ROUNDING * last:
+            raise PlantError(
+                f"step is {step} s, expected {last} s as before: the FMU has no canHandleVariableCommunicationStepSize"
+            )
 
     def _send(self) -> None:
         set_inputs, input_arguments = self._bound.set_inputs
@@ -246,3 +318,9 @@ class CoSimulationInstance:
 
     def __exit__(self, *error: object) -> None:
         self.close()
+
+
+def _number(what: str, value: object, expected: str) -> float:
+    if not isinstance(value, (int, float, np.integer, np.floating)) or isinstance(value, bool):
+        raise PlantError(f"{what} is {value!r}, expected {expected}")
+    return float(value)

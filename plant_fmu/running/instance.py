@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import functools
-import io
+import ctypes
 import logging
+import math
 import os
 import threading
 import weakref
@@ -15,17 +15,20 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-from fmpy.fmi2 import defaultCallbacks as default_callbacks
+import numpy as np
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 
-from plant_fmu.archive import make_archive, temporary_folder
+from plant_fmu.archive import temporary_folder
 from plant_fmu.errors import FmuFileError, PlantError
-from plant_fmu.unpacking import DESCRIPTION, library_names, unpack
+from plant_fmu.model_variables import ModelVariable, model_variables
+from plant_fmu.running.messages import Messages, fmi2_callbacks
+from plant_fmu.unpacking import library_names, unpack
 
 log = logging.getLogger(__name__)
 
-WARNING = 1  # the highest status that is no failure, in FMI 2.0 and 3.0
+_ERROR, _FATAL = 3, 4  # status, in FMI 2.0 and 3.0
 
 _LOADING = threading.Lock()  # FMPy changes the working folder of the whole process while it loads a library
 
@@ -34,27 +37,23 @@ _CAPABILITIES = {
     "state": ("canGetAndSetFMUstate", "canGetAndSetFMUState"),
     "serialize": ("canSerializeFMUstate", "canSerializeFMUState"),
     "derivatives": ("providesDirectionalDerivative", "providesDirectionalDerivatives"),
+    "varying step": ("canHandleVariableCommunicationStepSize",) * 2,
 }
 
 
-class Messages:
-    """Messages of an FMU. The object has no reference to the instance, so that callbacks keep nothing alive."""
+class _Life:
+    """What has to be ended with an instance. The object has no reference to it, so that it keeps nothing alive."""
 
     def __init__(self) -> None:
-        self._failures: deque[str] = deque(maxlen=4)
+        self.fmu: Any = None  # of FMPy, once its library is loaded
+        self.states: dict[int, Any] = {}  # handles to free, by address
+        self.running = False  # True from the initialization to the end, or to an error: it can be terminated
+        self.fatal = False  # True after a fatal error, which leaves nothing to be called
 
-    def receive(self, status: int, message: bytes) -> None:
-        """Log a message, and keep it if its status is a failure."""
-        text = message.decode("utf-8", "replace")
-        log.debug("FMU: %s", text)
-        if status > WARNING:
-            self._failures.append(" ".join(text.split()))
-
-    def take_failures(self) -> str:
-        """Return the failures since the last call, joined by semicolons, and clear them; "" for none."""
-        text = "; ".join(self._failures)
-        self._failures.clear()
-        return text
+    def note(self, status: int) -> None:
+        """Note the status of a call."""
+        self.running = self.running and status < _ERROR
+        self.fatal = self.fatal or status == _FATAL
 
 
 class Instance:
@@ -63,14 +62,14 @@ class Instance:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.messages = Messages()
-        self._states: dict[int, Any] = {}  # handles to free, by address
+        self.life = _Life()
+        self.no_rollback: Any = None  # argument of `doStep`: True while no state is kept
         self._dropped: deque[int] = deque()  # addresses of states without references
         extracted = contextlib.ExitStack()
         folder = extracted.enter_context(temporary_folder("plant_fmu-"))
-        loaded: list[Any] = []
-        self._end = weakref.finalize(self, _release, loaded, self._states, extracted)
+        self._end = weakref.finalize(self, _release, self.life, extracted)
         try:
-            self._load(path, folder, loaded)
+            self._load(path, folder)
         except PlantError:
             self._end()
             raise
@@ -81,7 +80,7 @@ class Instance:
             self._end()
             raise
 
-    def _load(self, path: Path, folder: Path, loaded: list[Any]) -> None:
+    def _load(self, path: Path, folder: Path) -> None:
         platforms = (fmpy.platform, fmpy.platform_tuple)
         try:
             root = unpack(path, folder, platforms)
@@ -94,11 +93,13 @@ class Instance:
         self.capabilities = {
             name for name, keys in _CAPABILITIES.items() if interface.get(keys[self.fmi - 2]) in ("true", "1")
         }
+        self.no_rollback = (ctypes.c_int if self.fmi == 2 else ctypes.c_bool)(True)
+        self.fixed_step = _number(interface.get("fixedInternalStepSize"))  # s
 
-        description = _parse_description(Path(folder, DESCRIPTION).read_bytes())
-        self.name, self.token = description.modelName, description.guid
-        self.variables = {v.name: v for v in description.modelVariables}
-        identifier = description.coSimulation.modelIdentifier
+        self.name = root.get("modelName", "")
+        self.token = root.get("guid" if self.fmi == 2 else "instantiationToken", "")
+        self.variables = model_variables(root)
+        identifier = interface.get("modelIdentifier")
         library = library_names(root, platforms)["CoSimulation"]
         if not Path(folder, library).is_file():
             raise PlantError(f"{path}: has no binary for this machine, expected {library}")
@@ -111,12 +112,14 @@ class Instance:
                 )
             finally:
                 os.chdir(working_folder)
-        loaded.append(self.fmu)
+        self.life.fmu = self.fmu
+        # with logging on, without which many FMUs do not say why they fail; some do not either for a list of categories
         if self.fmi == 2:
-            self.fmu.instantiate(callbacks=_callbacks_fmi2(self.messages))
+            self.fmu.instantiate(callbacks=fmi2_callbacks(self.messages), loggingOn=True)
         else:
             receive = self.messages.receive
-            self.fmu.instantiate(logMessage=lambda environment, status, category, message: receive(status, message))
+            log_message = lambda environment, status, category, message: receive(status, message)  # noqa: E731
+            self.fmu.instantiate(loggingOn=True, logMessage=log_message)
 
     # ---- calls ----
 
@@ -125,28 +128,33 @@ class Instance:
         try:
             return call(*arguments, **named)
         except Exception as error:
+            self.life.note(getattr(error, "status", 0))
             raise PlantError(self.messages.take_failures() or _message_of(error)) from error
 
-    def get(self, variable: Any) -> Any:
-        """Return the value of a scalar variable, as a float, int, bool or str."""
-        value = self.do(getattr(self.fmu, f"get{self._type(variable)}"), [variable.valueReference])[0]
+    def get(self, variable: ModelVariable) -> Any:
+        """Return the value of a variable, as a float, int, bool or str; an array as a NumPy array."""
+        get, shape = getattr(self.fmu, f"get{self._type(variable)}"), variable.shape
+        if shape:
+            return np.array(self.do(get, [variable.reference], math.prod(shape))).reshape(shape)
+        value = self.do(get, [variable.reference])[0]
         if isinstance(value, bytes):  # FMPy decodes strings of FMI 3.0 alone
             return value.decode("utf-8", "replace")
         return bool(value) if variable.type == "Boolean" else value
 
-    def set(self, variables: list[Any], values: list[Any]) -> None:
-        """Set scalar variables that are all of one type, in one call."""
-        references = [v.valueReference for v in variables]
+    def set(self, variables: list[ModelVariable], values: list[Any]) -> None:
+        """Set variables that are all of one type, in one call; values are those of all, side by side."""
+        references = [v.reference for v in variables]
         self.do(getattr(self.fmu, f"set{self._type(variables[0])}"), references, values)
 
-    def _type(self, variable: Any) -> str:
-        return ("Integer" if self.fmi == 2 else "Int64") if variable.type == "Enumeration" else str(variable.type)
+    def _type(self, variable: ModelVariable) -> str:
+        return ("Integer" if self.fmi == 2 else "Int64") if variable.type == "Enumeration" else variable.type
 
     # ---- FMU states ----
 
     def keep(self, handle: Any) -> Any:
         """Store a state's handle, so that `close` frees it at the latest, and return it."""
-        self._states[handle.value] = handle
+        self.life.states[handle.value] = handle
+        self.no_rollback.value = False
         return handle
 
     def drop(self, address: int) -> None:
@@ -160,8 +168,9 @@ class Instance:
 
     def free(self, address: int) -> None:
         """Free a state, once."""
-        if address in self._states:
-            self.do(self.fmu.freeFMUState, self._states.pop(address))
+        if address in self.life.states:
+            self.do(self.fmu.freeFMUState, self.life.states.pop(address))
+            self.no_rollback.value = not self.life.states
 
     # ---- the end ----
 
@@ -171,44 +180,39 @@ class Instance:
         return not self._end.alive
 
     def close(self) -> None:
-        """Free states and instance, unload the library, remove the folder. May be called twice."""
+        """Terminate, free states and instance, unload the library, remove the folder. May be called twice."""
         self._end()
 
 
-@functools.lru_cache(maxsize=16)
-def _parse_description(xml: bytes) -> Any:
-    """Return FMPy's parsed model description, which is not to be changed; parsing is half of an instance's start."""
-    # FMPy reads FMUs only, so the text is packed into one without other files.
-    return fmpy.read_model_description(io.BytesIO(make_archive({DESCRIPTION: xml})))
-
-
-def _release(loaded: list[Any], states: dict[int, Any], extracted: contextlib.ExitStack) -> None:
+def _number(text: str | None) -> float:
+    """Return an optional attribute as a number above 0, else NaN."""
     try:
-        for fmu in loaded:
-            if fmu.component:
-                for handle in states.values():
-                    fmu.freeFMUState(handle)
-                fmu.freeInstance()
-            else:
-                fmu.freeLibrary()
+        number = float(text or "nan")
+    except ValueError:
+        return math.nan
+    return number if number > 0.0 else math.nan
+
+
+def _release(life: _Life, extracted: contextlib.ExitStack) -> None:
+    fmu = life.fmu
+    try:
+        if fmu is None or life.fatal:
+            return
+        if not fmu.component:
+            fmu.freeLibrary()
+            return
+        if life.running:
+            with contextlib.suppress(FMICallException):
+                fmu.terminate()
+        for handle in life.states.values():
+            fmu.freeFMUState(handle)
+        fmu.freeInstance()
     except Exception as error:  # noqa: BLE001 -- an FMU that cannot end well must not keep the folder
         log.warning("FMU not freed: %s", _message_of(error))
     finally:
-        states.clear()
+        life.states.clear()
         extracted.close()
 
 
 def _message_of(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
-
-
-def _callbacks_fmi2(messages: Messages) -> fmi2CallbackFunctions:
-    # not through FMPy's logger proxy, which formats variadic messages but serves one instance in the whole process
-    def receive(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
-        messages.receive(status, message)
-
-    callbacks = fmi2CallbackFunctions()
-    callbacks.logger = fmi2CallbackLoggerTYPE(receive)
-    callbacks.allocateMemory = default_callbacks.allocateMemory
-    callbacks.freeMemory = default_callbacks.freeMemory
-    return callbacks

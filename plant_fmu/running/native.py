@@ -29,7 +29,7 @@ class Native(NamedTuple):
     inputs: NDArray[np.float64]  # (n,) values sent by set_values
     output_references: NDArray[np.uint32]  # (m,) value references of the outputs
     outputs: NDArray[np.float64]  # (m,) values filled in by get_values
-    results: NDArray[np.int64]  # (4,) results of fmi3DoStep by pointer, each at the first byte of its element
+    results: NDArray[np.int64]  # (5,) results of fmi3DoStep by pointer, each at the first byte of its element; status
     get_flags: int = 0  # fmi3GetBoolean
     flag_references: NDArray[np.uint32] = _NO_REFERENCES  # (f,) value references of the Boolean outputs
     flags: NDArray[np.bool_] = _NO_FLAGS  # (f,) values filled in by get_flags
@@ -54,7 +54,7 @@ def native_calls(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str
         inputs=np.zeros(len(inputs)),
         output_references=_references(instance, outputs),
         outputs=np.zeros(len(outputs)),
-        results=np.zeros(4, np.int64),
+        results=np.zeros(5, np.int64),
         get_flags=address("fmi3GetBoolean"),
         flag_references=_references(instance, flags, ("Boolean",)),
         flags=np.zeros(len(flags), np.bool_),
@@ -64,6 +64,6 @@ def native_calls(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str
 def _references(instance: Instance, names: tuple[str, ...], types: tuple[str, ...] = DOUBLES) -> NDArray[np.uint32]:
     for name in names:
         variable = instance.variables.get(name)
-        if variable is None or variable.type not in types or variable.dimensions:
+        if variable is None or variable.type not in types or variable.shape:
             raise PlantError(f"FMU variable {name!r} is no scalar of type {' or '.join(types)} of {instance.path}")
-    return np.array([instance.variables[name].valueReference for name in names], dtype=np.uint32)
+    return np.array([instance.variables[name].reference for name in names], dtype=np.uint32)

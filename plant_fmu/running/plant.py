@@ -210,10 +210,10 @@ class Plant(CoSimulationInstance):
     def _real(self, name: str) -> int:
         """Return the value reference of a variable that has derivatives."""
         variable = self._variable(name)
-        if variable.type not in DOUBLES or variable.dimensions:
-            kind = "an array" if variable.dimensions else f"of type {variable.type}"
+        if variable.type not in DOUBLES or variable.shape:
+            kind = "an array" if variable.shape else f"of type {variable.type}"
             raise PlantError(f"{name} is {kind}, expected a real scalar variable")
-        return int(variable.valueReference)
+        return variable.reference
 
     def _require(self, capability: str, action: str) -> None:
         self._require_open()

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from typing import Any
 
 import numpy as np
 
 from plant_fmu.errors import PlantError
+from plant_fmu.model_variables import ModelVariable
 from plant_fmu.running.channels import DOUBLES
 
 Value = float | int | bool | str
 
+_ROUNDING = 1e-9  # how far outside of its range a value may be, relative to the bound if that is above one
 _REALS = (*DOUBLES, "Float32")
 _INTEGERS = {  # number of bits of each type of whole numbers, and True if signed
     "Integer": (32, True),
@@ -21,15 +24,23 @@ _INTEGERS = {  # number of bits of each type of whole numbers, and True if signe
 }
 
 
-def convert_value(variable: Any, value: Any) -> Value:
-    """Convert a value to its variable's type."""
+def convert_values(variable: ModelVariable, value: Any) -> list[Value]:
+    """Convert a value to its variable's type: to one, or to the items of an array row by row."""
+    shape = variable.shape
+    if not shape:
+        return [convert_value(variable, value)]
+    if np.shape(value) != shape:
+        raise PlantError(f"{variable.name} has shape {np.shape(value)}, expected {shape}")
+    return [convert_value(variable, item) for item in np.asarray(value).ravel().tolist()]
+
+
+def convert_value(variable: ModelVariable, value: Any) -> Value:
+    """Convert one value to its variable's type; a number that exceeds its range by rounding is clipped."""
     kind = variable.type
-    if variable.dimensions:
-        raise PlantError(f"{variable.name} is an array, expected a scalar: arrays cannot be set")
     is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     if kind in _REALS:
         if is_number and not math.isnan(value):
-            return float(value)
+            return _clip(variable, float(value))
         raise _type_error(variable, float(value) if is_number else value, "a number")
     if kind in _INTEGERS:
         if not (is_number and math.isfinite(value) and value == int(value)):
@@ -50,7 +61,17 @@ def convert_value(variable: Any, value: Any) -> Value:
     raise PlantError(f"{variable.name} is of type {kind}, which cannot be set")
 
 
-def require_settable(variable: Any, initialized: bool) -> None:
+def _clip(variable: ModelVariable, value: float) -> float:
+    for bound in (variable.minimum, variable.maximum):
+        with contextlib.suppress(ValueError):  # there is none, or it is no number
+            number = float(bound)
+            is_beyond = value < number if bound is variable.minimum else value > number
+            if is_beyond and abs(value - number) <= _ROUNDING * max(1.0, abs(number)):
+                return number
+    return value
+
+
+def require_settable(variable: ModelVariable, initialized: bool) -> None:
     """Require that FMI allows to set a variable now."""
     if variable.causality == "input":
         return
@@ -61,6 +82,6 @@ def require_settable(variable: Any, initialized: bool) -> None:
         raise PlantError(f"{variable.name} cannot be set any more: initialize() fixed it, until reset()")
 
 
-def _type_error(variable: Any, value: object, expected: str) -> PlantError:
+def _type_error(variable: ModelVariable, value: object, expected: str) -> PlantError:
     unit = f" in {variable.unit}" if variable.unit else ""
     return PlantError(f"{variable.name} is {value!r}, expected {expected}{unit}")

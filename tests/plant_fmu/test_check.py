@@ -84,22 +84,25 @@ def test_importer_with_another_result_fails_the_check(odin):
 @pytest.mark.parametrize(
     ("old", "new", "status"),
     [
-        ('unit="m"', 'unit="parsec"', "failed"),
+        ('unit="m"', 'unit="parsec"', "ok"),
         ('instantiationToken="{', 'instantiationToken="{0', "failed"),
-        (' start="', ' was="', "failed"),
-        ('causality="independent"', 'causality="local"', "failed"),
+        (' start="', ' was="', "ok"),
+        ('causality="independent"', 'causality="local"', "ok"),
         ("CoSimulation", "ScheduledExecution", "does not apply"),
         ('modelIdentifier="odin"', 'modelIdentifier="other"', "does not apply"),
     ],
 )
 def test_check_says_what_plant_says(edited, scratch, old, new, status):
     path = edited((old, new))
+    row = run_importer(PLANT, read_fmu(path), Task(0.1, 0.1))
+    assert row.status == status
+    if status == "ok":
+        Plant(path).close()
+        return
     with pytest.raises(PlantError) as caught:
         Plant(path)
     assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
     assert list(scratch.iterdir()) == []
-    row = run_importer(PLANT, read_fmu(path), Task(0.1, 0.1))
-    assert row.status == status
     assert row.note.removeprefix("the FMU ").partition(",")[0] in str(caught.value)
     assert status != "failed" or row.note == str(caught.value)
 

@@ -105,31 +105,50 @@ def test_no_step_beyond_the_stop_time(make_slave):
 
 
 @pytest.mark.parametrize(
-    ("start", "stop", "name"),
-    [(math.nan, None, "start"), (1.0, 0.5, "stop"), (0.0, math.nan, "stop"), (-2e9, None, "start")],
-)
-def test_refused_times_block_initialization(make_slave, fmi, start, stop, name):
-    """Until valid times are set, or a reset: an importer that ignores the status must not run at rejected times."""
+    ("name", "experiment"),
+    [
+        ("start time", {"startTime": math.nan}), ("stop time", {"startTime": 1.0, "stopTime": 0.5}),
+        ("stop time", {"stopTime": math.nan}), ("start time", {"startTime": -2e9}), ("tolerance", {"tolerance": -1e-6}),
+    ],
+)  # fmt: skip
+def test_refused_experiments_block_initialization(make_slave, fmi, name, experiment):
+    """Until a valid one is set, or a reset: an importer that ignores the status must not run at rejected times."""
     slave = make_slave(fmi=fmi)
     if fmi == 2:
-        refused(slave, lambda: slave.fmu.setupExperiment(startTime=start, stopTime=stop), f"{name} time")
+        refused(slave, lambda: slave.fmu.setupExperiment(**experiment), name)
         state = slave.save()
         for _ in range(2):
-            said = "entering initialization: start and stop time were refused"
+            said = "entering initialization: the experiment was refused"
             refused(slave, slave.fmu.enterInitializationMode, said)
             slave.restore(state)  # which keeps it
         slave.free(state)
         slave.fmu.setupExperiment(startTime=1.0)
         slave.fmu.enterInitializationMode()
         slave.fmu.reset()
-        refused(slave, lambda: slave.fmu.setupExperiment(startTime=start, stopTime=stop))
+        refused(slave, lambda: slave.fmu.setupExperiment(**experiment))
         slave.fmu.reset()
         slave.fmu.enterInitializationMode()
     else:
-        refused(slave, lambda: slave.fmu.enterInitializationMode(startTime=start, stopTime=stop), f"{name} time")
+        refused(slave, lambda: slave.fmu.enterInitializationMode(**experiment), name)
         refused(slave, slave.fmu.exitInitializationMode, "leaving initialization: not allowed before initialization")
         slave.fmu.enterInitializationMode(startTime=1.0)
     slave.fmu.exitInitializationMode()
+
+
+def test_unknown_type_of_an_fmu_is_refused(make_slave):
+    slave = make_slave(fmi=2)
+    fmu, callbacks = slave.fmu, ctypes.byref(slave.fmu.callbacks)
+    assert not fmu.fmi2Instantiate(b"it", 7, fmu.guid.encode(), b"", callbacks, False, False)
+    assert "neither model exchange nor co-simulation" in slave.said[-1][1]
+
+
+def test_rounding_beyond_a_range_is_clipped(make_slave, fmi):
+    """Up to 1e-9; a message has all digits, so that the value and the end of the range do not look the same."""
+    slave, name = make_slave(fmi=fmi), "thrust_effectiveness[1]"
+    for value, kept in ((math.nextafter(1.0, 2.0), 1.0), (-5e-10, 0.0), (0.3, 0.3)):
+        slave.set_values({name: value})
+        assert slave.get(name) == [kept]
+    refused(slave, lambda: slave.set_values({name: 1.00000001}), "= 1.0000000099999999 refused: outside [0, 1]")
 
 
 def test_initialization_is_entered_once(make_slave, fmi):

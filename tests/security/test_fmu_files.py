@@ -84,7 +84,7 @@ EXTERNAL = '<!DOCTYPE x SYSTEM "file:///etc/passwd">'
     [
         *(([(name, "x")], "leads out|no name of a file") for name in OUTSIDE),
         ([(LINK, "/tmp")], "leads out"),
-        *(([(name, "x") for name in names], "would be written over") for names in TWICE),
+        *(([(name, f"{i}") for i, name in enumerate(names)], "would be written over") for names in TWICE),
         ([("sources/buildDescription.xml", f"{EXTERNAL}<x/>")], r"buildDescription\.xml is no XML that can be read"),
     ],
 )

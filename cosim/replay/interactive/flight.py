@@ -78,7 +78,7 @@ class Flight:
             inputs=np.array([self.start.get(name, self.variables[name].start) for name in inputs], float),
             output_references=references(outputs),
             outputs=np.zeros(len(outputs)),
-            results=np.zeros(4, np.int64),
+            results=np.zeros(5, np.int64),
             get_flags=Expression("(intptr_t)fmi3GetBoolean"),
             flag_references=references(flags),
             flags=np.zeros(len(flags), np.bool_),

@@ -54,16 +54,15 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     (void)fmuResourceLocation, (void)visible;
     if (!functions)
         return NULL;
-    return instance_create(instanceName, fmuGUID, fmuType == fmi2ModelExchange ? MODEL_EXCHANGE : CO_SIMULATION,
-                           loggingOn != fmi2False, log_message, functions->componentEnvironment,
-                           (void (*)(void))functions->logger);
+    const Interface kind = fmuType == fmi2CoSimulation ? CO_SIMULATION : fmuType == fmi2ModelExchange ? MODEL_EXCHANGE : NO_INTERFACE;
+    return instance_create(instanceName, fmuGUID, kind, loggingOn != fmi2False, log_message,
+                           functions->componentEnvironment, (void (*)(void))functions->logger);
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component instance, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
-    (void)toleranceDefined, (void)tolerance;
-    return (fmi2Status)instance_set_experiment(instance, startTime, stopTimeDefined ? stopTime : INFINITY);
+    return (fmi2Status)instance_set_experiment(instance, toleranceDefined ? tolerance : 0.0, startTime, stopTimeDefined ? stopTime : INFINITY);
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component instance)

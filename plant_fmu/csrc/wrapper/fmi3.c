@@ -66,9 +66,9 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
-    (void)toleranceDefined, (void)tolerance;
     if (instance_require_new(instance) != STATUS_OK ||
-        instance_set_experiment(instance, startTime, stopTimeDefined ? stopTime : INFINITY) != STATUS_OK)
+        instance_set_experiment(instance, toleranceDefined ? tolerance : 0.0, startTime,
+                                stopTimeDefined ? stopTime : INFINITY) != STATUS_OK)
         return fmi3Error;
     return (fmi3Status)instance_enter_initialization(instance);
 }

@@ -143,6 +143,11 @@ Instance *instance_create(const char *name, const char *token, Interface kind, b
         instance_free(instance);
         return NULL;
     }
+    if (kind == NO_INTERFACE) {
+        instance_refuse(instance, "FMU type is neither model exchange nor co-simulation");
+        instance_free(instance);
+        return NULL;
+    }
     if (kind == MODEL_EXCHANGE && !COMPONENT.apply_unlagged) {
         instance_refuse(instance, "this FMU offers co-simulation alone");
         instance_free(instance);
@@ -207,11 +212,13 @@ Status instance_update(Instance *instance)
 
 /* ---- modes ------------------------------------------------------------------------------------------------- */
 
-Status instance_set_experiment(Instance *instance, double start_time, double stop_time)
+Status instance_set_experiment(Instance *instance, double tolerance, double start_time, double stop_time)
 {
     if (instance_require(instance, MODE_INSTANTIATED, "setting the experiment") != STATUS_OK)
         return STATUS_ERROR;
-    instance->refused = true; /* until both times are valid */
+    instance->refused = true; /* until all of them are valid */
+    if (!(tolerance >= 0.0))
+        return instance_refuse(instance, "tolerance is %g, expected a positive number", tolerance);
     if (!(fabs(start_time) <= MAX_TIME))
         return instance_refuse(instance, "start time is %g s, expected a number within %g", start_time, MAX_TIME);
     if (!(stop_time >= start_time))
@@ -234,7 +241,7 @@ Status instance_enter_initialization(Instance *instance)
     if (instance_require_new(instance) != STATUS_OK)
         return STATUS_ERROR;
     if (instance->refused)
-        return instance_refuse(instance, "entering initialization: start and stop time were refused, set valid ones first");
+        return instance_refuse(instance, "entering initialization: the experiment was refused, set a valid one first");
     instance->mode = MODE_INITIALIZING;
     return STATUS_OK;
 }

@@ -12,7 +12,7 @@ enum { MAX_MESSAGE = 512 }; /* bytes of a logged message */
 
 #define MAX_TIME 1e9 /* s */
 
-typedef enum { CO_SIMULATION, MODEL_EXCHANGE } Interface;
+typedef enum { CO_SIMULATION, MODEL_EXCHANGE, NO_INTERFACE } Interface;
 
 typedef enum {
     MODE_INSTANTIATED = 1,
@@ -63,7 +63,7 @@ Status instance_reset(Instance *instance);
 /* Refuses to enter initialization twice, or after it has ended. */
 Status instance_require_new(const Instance *instance);
 /* Sets the experiment's times; a stop time of INFINITY: none. */
-Status instance_set_experiment(Instance *instance, double start_time, double stop_time);
+Status instance_set_experiment(Instance *instance, double tolerance, double start_time, double stop_time);
 Status instance_enter_initialization(Instance *instance);
 Status instance_exit_initialization(Instance *instance);
 Status instance_terminate(Instance *instance);

@@ -87,6 +87,14 @@ static unsigned modes_to_set(Role role)
     }
 }
 
+/* How far outside of its range a value may be, relative to the bound if that is above one: it is clipped. */
+static const double ROUNDING = 1e-9;
+
+static double clip(const Variable *v, double value)
+{
+    return value < v->min ? v->min : value > v->max ? v->max : value;
+}
+
 static Status check_value(const Instance *instance, Type type, unsigned reference, double value)
 {
     if (check_reference(instance, type, reference) != STATUS_OK)
@@ -99,8 +107,9 @@ static Status check_value(const Instance *instance, Type type, unsigned referenc
         return instance_require(instance, modes_to_set(v->role), v->name);
     if (!isfinite(value))
         return instance_refuse(instance, "%s = %g refused: not a finite number", v->name, isnan(value) ? fabs(value) : value);
-    if (value < v->min || value > v->max)
-        return instance_refuse(instance, "%s = %.9g refused: outside [%.9g, %.9g]", v->name, value, v->min, v->max);
+    const double bounded = clip(v, value);
+    if (fabs(value - bounded) > ROUNDING * fmax(1.0, fabs(bounded)))
+        return instance_refuse(instance, "%s = %.17g refused: outside [%.17g, %.17g]", v->name, value, v->min, v->max);
     return STATUS_OK;
 }
 
@@ -116,7 +125,7 @@ Status instance_set_reals(Instance *instance, const unsigned references[], size_
         if (check_value(instance, TYPE_REAL, references[i], values[i]) != STATUS_OK)
             return STATUS_ERROR;
     for (size_t i = 0; i < n; i++) {
-        *variable_real(&instance->model, &VARIABLES[references[i]]) = values[i];
+        *variable_real(&instance->model, &VARIABLES[references[i]]) = clip(&VARIABLES[references[i]], values[i]);
         note_change(instance, &VARIABLES[references[i]]);
     }
     return STATUS_OK;
