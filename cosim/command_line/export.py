@@ -21,8 +21,9 @@ def add_verbs(verbs: Any) -> None:
         "source", metavar="RUN|SCENARIO", help="the run folder; with --to ssp a shipped name or TOML file"
     )
     flag(
-        verb, "--to FORMAT", "csv (spreadsheets), mcap (Foxglove, PlotJuggler), rrd (Rerun), tlog (QGroundControl); "
-        "or ssp: plant, controller and arbiter of a scenario as FMUs that other masters run", required=True,
+        verb, "--to FORMAT", "csv (spreadsheets), mcap (Foxglove, PlotJuggler), rrd (Rerun), rosbag2 (ROS 2), tlog "
+        "(QGroundControl); or ssp: plant, controller and arbiter of a scenario as FMUs that other masters run",
+        required=True,
     )  # fmt: skip
     flag(verb, "--out FILE", "file to write (default: RUN.FORMAT or SCENARIO.ssp here)", Path)
     flag(verb, "--force", "replace a file that exists")

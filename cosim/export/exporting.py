@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cosim.errors import ExportError, RunError
 from cosim.export.excerpt import excerpt_of
-from cosim.export.formats import FORMATS
+from cosim.export.formats import FORMATS, Format
 from cosim.results.record import RECORD, STREAM
 from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY
 from plant_fmu.archive import temporary_folder
@@ -39,9 +39,9 @@ def export_run(
     folder : str or Path
         Folder of a run that was completed, interrupted or killed.
     to : str
-        Name of the format: csv, mcap, rrd or tlog.
+        Name of the format: csv, mcap, rrd, rosbag2 or tlog.
     out : str or Path, optional
-        File to write; default: the folder's name with the format as suffix, in the current folder.
+        File to write, with rosbag2 a folder; default: the run's name with the format as suffix, in the current folder.
     signals : sequence of str
         Names or patterns of signals; none for all.
     every : int
@@ -75,13 +75,15 @@ def export_run(
         instead = f"; {_REMOVED[to]}" if to in _REMOVED else ""
         raise ExportError(f"--to {to}: expected one of {', '.join(FORMATS)}{instead}")
     form = FORMATS[to]
-    if form.whole and (signals or every != 1 or rate is not None):
-        raise ExportError(f"--to {to}: expected no --signals, --every or --rate with it: its messages have their own")
+    chosen = {"signals": bool(signals), "every": every != 1, "rate": rate is not None}
+    if any(chosen[name] for name in form.fixed):
+        flags = ", ".join(f"--{name}" for name in form.fixed)
+        raise ExportError(f"--to {to}: expected without {flags}, since its messages have their own")
     folder = Path(folder)
     path = Path(out or f"{folder.resolve().name}.{to}")
     files = [path, *([path.with_suffix(form.beside)] if form.beside else [])]
     for file in files:
-        if file.exists() and not (force and file.is_file()):
+        if file.exists() and not (force and _is_replaceable(file, form)):
             raise ExportError(f"{file}: exists; expected a new file, or --force to replace it")
         if file.name in _RUN_FILES and file.parent.resolve() == folder.resolve():
             raise ExportError(f"{file}: belongs to the run itself, expected another file")
@@ -91,10 +93,13 @@ def export_run(
         try:
             with temporary_folder(f".{path.name}-", path.parent) as scratch:
                 for file in import_module(form.writer).write(excerpt, scratch / path.name):
+                    if form.folder and path.exists():
+                        path.rename(scratch / "replaced")
                     file.replace(path.parent / file.name)
         except BaseException:
             for file in new:  # so that the same command does not meet the first of two
-                file.unlink(missing_ok=True)
+                if file.is_file():
+                    file.unlink()
             raise
     except ModuleNotFoundError as error:
         if not form.needs or (error.name or "").startswith("cosim"):
@@ -103,3 +108,10 @@ def export_run(
     except OSError as error:
         raise RunError(f"{path}: {error.strerror or error}") from error
     return files
+
+
+def _is_replaceable(path: Path, form: Format) -> bool:
+    """Check that an existing file, or folder with the format's files alone, may be replaced."""
+    if not form.folder:
+        return path.is_file()
+    return path.is_dir() and all(file.is_file() and file.suffix in form.folder for file in path.iterdir())

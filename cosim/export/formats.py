@@ -14,7 +14,8 @@ class Format:
     writer: str
     needs: tuple[str, ...] = ()  # packages beyond the base installation, as pip requirements
     beside: str = ""  # suffix of a second file; empty for none
-    whole: bool = False  # true if the format defines its own signals and rates, which cannot be selected
+    folder: frozenset[str] = frozenset()  # suffixes of the files of a format that is a folder
+    fixed: tuple[str, ...] = ()  # selections that the format makes itself: signals, every, rate
 
 
 _MCAP = ("foxglove-schemas-protobuf>=0.3", "mcap>=1.2", "mcap-protobuf-support>=0.5", "protobuf>=4.25")
@@ -22,5 +23,11 @@ FORMATS = {
     "csv": Format("cosim.export.csv_writer", beside=".units.csv"),
     "mcap": Format("cosim.export.mcap_writer", needs=_MCAP),
     "rrd": Format("cosim.export.rrd_writer", needs=("rerun-sdk>=0.31",)),
-    "tlog": Format("cosim.export.tlog_writer", whole=True),
+    "rosbag2": Format(
+        "cosim.export.rosbag2_writer",
+        needs=("rosbags>=0.11.6",),
+        folder=frozenset({".db3", ".yaml"}),
+        fixed=("signals",),
+    ),
+    "tlog": Format("cosim.export.tlog_writer", fixed=("signals", "every", "rate")),
 }

@@ -30,7 +30,12 @@ ONE_PLACE = {
     "pandas": {"cosim.results.run_result"},
     "pymavlink": {"cosim.mavlink.wire.dialect", "cosim.logs.formats.dataflash"},
     "rerun": {"cosim.export.rrd_writer"},
-    "rosbags": {"cosim.logs.bag_storage", "cosim.logs.formats.bag", "cosim.logs.message_definitions"},
+    "rosbags": {
+        "cosim.export.rosbag2_writer",
+        "cosim.logs.bag_storage",
+        "cosim.logs.formats.bag",
+        "cosim.logs.message_definitions",
+    },
     "rich": {"cosim.command_line.watch", "cosim.live.watching.terminal_view"},
     "shtab": {"cosim.command_line.help"},
     "skfuzzy": {"fuzzy_arbiter.engines.scikit"},
@@ -43,7 +48,10 @@ ONE_PLACE = {
 OPTIONAL = {
     "dask", "distributed", "foxglove_schemas_protobuf", "google", "mcap", "mcap_protobuf", "pandas", "rerun", "rosbags",
 }  # fmt: skip
-WANT_AN_EXTRA = {f"cosim.export.{name}" for name in ("mcap_writer", "rrd_writer", "foxglove_scene", "protobuf_table")}
+WANT_AN_EXTRA = {
+    f"cosim.export.{name}"
+    for name in ("mcap_writer", "rrd_writer", "rosbag2_writer", "foxglove_scene", "protobuf_table")
+}
 
 # what shows a run while it goes on: a run that nobody watches does without
 OF_SHOWING = {"pymavlink", "rich", "websockets"}

@@ -90,7 +90,10 @@ def test_of_two_files_none_is_left_without_the_other(run, tmp_path, monkeypatch)
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(("to", "lacking", "brings"), [("mcap", "mcap", "mcap"), ("rrd", "rerun", "rerun-sdk")])
+@pytest.mark.parametrize(
+    ("to", "lacking", "brings"),
+    [("mcap", "mcap", "mcap"), ("rrd", "rerun", "rerun-sdk"), ("rosbag2", "rosbags", "rosbags")],
+)
 def test_missing_library_is_named(run, tmp_path, monkeypatch, to, lacking, brings):
     plain = builtins.__import__
 
@@ -113,9 +116,9 @@ def test_missing_library_is_named(run, tmp_path, monkeypatch, to, lacking, bring
         ("{run} --to mat", "; MATLAB reads RUN/record.parquet by parquetread\n"),
         ("nowhere --to csv", "holds no run"),
         ("{run} --to csv --signals postion.x", "--signals postion.x: fits no signal of the run; expected such as"),
-        ("{run} --to tlog --signals time", "expected no --signals, --every or --rate with it"),
-        ("{run} --to tlog --every 2", "expected no --signals, --every or --rate with it"),
-        ("{run} --to tlog --rate 5", "expected no --signals, --every or --rate with it"),
+        ("{run} --to tlog --signals time", "expected without --signals, --every, --rate, since"),
+        ("{run} --to tlog --every 2", "expected without --signals, --every, --rate, since"),
+        ("{run} --to tlog --rate 5", "expected without --signals, --every, --rate, since"),
     ],
 )
 def test_requests_that_cannot_be_met_are_one_line(run, tmp_path, monkeypatch, capsys, words, said):
