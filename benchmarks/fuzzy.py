@@ -22,7 +22,8 @@ from benchmarks.peers import skfuzzy_rules
 from benchmarks.peers.fuzzy_libraries import LIBRARIES
 from benchmarks.table import Row, compared
 from benchmarks.timing import Own, Timing, time_batches, time_calls, timed
-from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion, Output, System, Variable, auto_terms, curve, triangle
+from fuzzy_arbiter import Arbiter, Output, System, Variable, auto_terms, curve, triangle
+from fuzzy_arbiter.criteria import SECTION_VI, Criterion
 from fuzzy_arbiter.definition import Defuzzifier
 from fuzzy_arbiter.shapes import Membership
 
@@ -135,7 +136,7 @@ def _other_batch(system: str, rows: int, repeats: int) -> Timing | str:
 def _general() -> Arbiter:
     """Return the paper's rules with one of lower weight, for which there is no closed form."""
     system = Arbiter().system
-    return Arbiter(system=replace(system, rules=(*system.rules[:-1], replace(system.rules[-1], weight=0.9))))
+    return Arbiter(replace(system, rules=(*system.rules[:-1], replace(system.rules[-1], weight=0.9))))
 
 
 def _tipping(curved: bool = False, defuzzifier: Defuzzifier = "centroid", aggregation: str = "max") -> Arbiter:

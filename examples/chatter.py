@@ -13,7 +13,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion, HysteresisArbiter, falling
+from fuzzy_arbiter import Arbiter, falling
+from fuzzy_arbiter.criteria import SECTION_VI, Criterion, HysteresisArbiter
 
 Array = NDArray[np.float64]
 Decide = Callable[[Array, Array], Array]

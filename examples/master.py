@@ -4,7 +4,8 @@ import numpy as np
 
 from controller import Gains, IsmailDunniganLaw, VehicleState
 from controller.regions import Region, Sphere, pack
-from fuzzy_arbiter import Arbiter, ramp
+from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter.criteria import ramp
 from plant_fmu import Plant
 
 STEP, DURATION = 0.01, 30.0

@@ -16,19 +16,8 @@ running it cell by cell; importing it does neither.
 import numpy as np
 from matplotlib.figure import Figure
 
-from fuzzy_arbiter import (
-    Arbiter,
-    Criterion,
-    Output,
-    Rule,
-    System,
-    Variable,
-    falling,
-    pictures,
-    rising,
-    trapezoid,
-    triangle,
-)
+from fuzzy_arbiter import Arbiter, Output, Rule, System, Variable, falling, pictures, rising, trapezoid, triangle
+from fuzzy_arbiter.criteria import Criterion
 
 # %% [markdown]
 # ## From measurements to weights

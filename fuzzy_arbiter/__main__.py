@@ -26,14 +26,14 @@ except ModuleNotFoundError as error:  # in a checkout that is not installed
 
 FINDINGS, FAULT, INTERRUPTED, NO_READER = 1, 2, 130, 141
 
-_EPILOG = """FILE is of JSON, TOML, FCL, FIS or FLL, by its suffix, or the word section-vi: the arbiter of
-obstacle, shape and depth.
+_EPILOG = """FILE is of JSON, TOML, FCL, FIS or FLL, by its suffix, or the word section-vi: the paper's arbiter
+of obstacle, shape and depth.
 
 examples:
-  python -m fuzzy_arbiter show section-vi
-  python -m fuzzy_arbiter eval section-vi obstacle=0.75 shape=1 depth=0
-  python -m fuzzy_arbiter eval arbiter.toml --csv day.csv --out weights.csv
-  python -m fuzzy_arbiter explain arbiter.toml 0.75 1 0
+  python -m fuzzy_arbiter show tipping.fis
+  python -m fuzzy_arbiter eval tipping.fis service=9.8 food=6.5
+  python -m fuzzy_arbiter eval arbiter.toml --csv day.csv --out results.csv
+  python -m fuzzy_arbiter explain section-vi 0.75 1 0
   python -m fuzzy_arbiter verify arbiter.fis || echo "see what it found"
   python -m fuzzy_arbiter convert section-vi arbiter.fis --native
   python -m fuzzy_arbiter plot section-vi decisions --input obstacle --input shape --at depth=0.4 --out who.svg
@@ -69,7 +69,7 @@ class _Parser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="python -m fuzzy_arbiter",
-        description="Fuzzy arbiters of prioritized criteria.",
+        description="Evaluate, explain, verify, convert and draw fuzzy systems.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -91,21 +91,21 @@ def _parser() -> argparse.ArgumentParser:
         return added
 
     verb("show", "variables, terms, rules, norms, and which engine evaluates them")
-    what = "weights for one sample, or for each row of a table"
+    what = "outputs for one sample, or for each row of a table"
     add = verb("eval", what, values=True, as_json=True).add_argument
     table = "table whose first line names the inputs, - for standard input; others are ignored"
     add("--csv", metavar="FILE", help=table)
     add("--out", metavar="FILE", help="file to write (default: standard output)")
     verb("explain", "which rules fire for a sample, how strongly, and which decide", values=True, as_json=True)
-    what = "whether the rules are complete and, of criteria, consistent; exit status 1 if not"
+    what = "whether the rules leave no gap; exit status 1 if they do"
     add = verb("verify", what, engine=False, as_json=True).add_argument
-    add("--as-criteria", action="store_true", default=None, help="check the consistency of any rules")
+    add("--as-criteria", action="store_true", default=None, help="check also that no two rules contradict each other")
 
     add = verb("convert", "write a definition in another format, or as source code", engine=False).add_argument
     add("out", metavar="OUT", help=".json, .toml, .fcl, .fis, .fll, or .c, .py for code that evaluates it")
-    add("--native", action="store_true", help="make the centroids the weights, for tools that do not normalize")
+    add("--native", action="store_true", help="fold the normalization of criteria into the universe")
 
-    what = "draw terms, rules at a sample, weights over inputs, or which output is the greatest where"
+    what = "draw terms, rules at a sample, outputs over inputs, or which output is the greatest where"
     add = verb("plot", what).add_argument
     add("kind", choices=PICTURES, metavar="PICTURE", help=", ".join(PICTURES))
     along = "along which; given twice for surface and decisions (default: the first; for terms all)"
@@ -195,7 +195,7 @@ def _run(options: argparse.Namespace) -> int:
 
         print(bench(system))
         return 0
-    arbiter = Arbiter(system=system, engine=getattr(options, "engine", "auto"))
+    arbiter = Arbiter(system, engine=getattr(options, "engine", "auto"))
     if options.verb in ("verify", "explain"):
         explains = options.verb == "explain"
         result = arbiter.explain(sample(options.values, system)) if explains else arbiter.verify(options.as_criteria)

@@ -1,4 +1,4 @@
-"""The arbiter: inputs in, weights out, by a chosen engine."""
+"""The arbiter: inputs in, values of the outputs out, by a chosen engine."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import Normalization, Output, Outside, System, variable_names
 from fuzzy_arbiter.engines import choose
 from fuzzy_arbiter.errors import DefinitionError, InputError
@@ -24,18 +25,19 @@ if TYPE_CHECKING:
 
 
 class Arbiter:
-    """Decide to what degree each of several prioritized criteria matters now, in the manner of a human pilot.
+    """Evaluate a fuzzy system.
 
-    No decision depends on those before it; threads may share it.
+    No result depends on those before it; threads may share it.
 
     Parameters
     ----------
-    criteria : sequence of Criterion
-        Criteria by descending priority; default: obstacle, shape, depth of the paper's section VI.
+    system : System or sequence of Criterion
+        A fuzzy system; or criteria by descending priority, of which `fuzzy_arbiter.criteria.prioritized` makes one, by
+        default obstacle, shape, depth of the paper's section VI.
+    criteria : sequence of Criterion, optional
+        Criteria in place of `system`.
     form, weight, normalization, outside, points
-        Form of the system, as for `prioritized`.
-    system : System, optional
-        A Mamdani system, in place of all of the above.
+        Form of the system of criteria, as for `prioritized`.
     engine : {"auto", "closed", "exact", "grid", "skfuzzy"}
         ``closed`` is the exact centroid in closed form, for outputs of two complementary terms; ``exact`` the exact
         centroid of any system; ``grid`` sums over samples, as MATLAB does; ``skfuzzy`` is scikit-fuzzy. ``auto`` takes
@@ -44,35 +46,39 @@ class Arbiter:
     Raises
     ------
     DefinitionError
-        If the definition makes no arbiter, or the engine cannot evaluate it.
+        If the definition is invalid, or the engine cannot evaluate it.
 
     Examples
     --------
-    >>> from fuzzy_arbiter import Arbiter
-    >>> Arbiter()(obstacle=1.0, shape=1.0, depth=0.0)
-    Result(obstacle=1.0, shape=0.0, depth=0.0)
+    >>> from fuzzy_arbiter import Arbiter, Output, System, Variable, auto_terms
+    >>> food, tip = Variable("food", (0, 10), auto_terms(3)), Output("tip", (0, 25), auto_terms(3))
+    >>> tipping = Arbiter(System([food], [tip], [f"if food is {term} then tip is {term}" for term in food.term_names]))
+    >>> tipping(food=5)
+    Result(tip=12.5)
     """
 
     def __init__(
         self,
-        criteria: Sequence[Criterion] = SECTION_VI,
+        system: System | Sequence[Criterion] = SECTION_VI,
         *,
+        criteria: Sequence[Criterion] | None = None,
         form: Form = "hierarchical",
         weight: Output = WEIGHT,
         normalization: Normalization = "range",
         outside: Outside = "refuse",
         points: int = 101,
-        system: System | None = None,
         engine: str = "auto",
     ) -> None:
-        if isinstance(criteria, System):
-            raise DefinitionError("criteria: got a System, expected Arbiter(system=...)")
-        if system is None:
-            system = prioritized(criteria, form, weight, normalization, outside, points)
-        elif (criteria, form, weight, normalization, outside, points) != (*_DEFAULTS,):
-            raise DefinitionError(
-                "system: pass either a system, or criteria with form, weight, normalization, outside and points"
-            )
+        if criteria is not None:
+            if system is not SECTION_VI:
+                raise DefinitionError("got a system and criteria, expected one of the two")
+            system = criteria
+        if not isinstance(system, System):
+            if not isinstance(system, Sequence):
+                raise DefinitionError(f"system is {shown(system)}, expected a System")
+            system = prioritized(system, form, weight, normalization, outside, points)
+        elif (form, weight, normalization, outside, points) != _DEFAULTS:
+            raise DefinitionError("got a System with form, weight, normalization, outside or points, expected it alone")
         self._system = system
         self._engine, self._why = choose(system, engine)
         self._shortcut = self._engine.shortcut()
@@ -101,10 +107,8 @@ class Arbiter:
 
     def __call__(self, inputs: Sample | None = None, /, *others: object, **named: float) -> Result[float]:
         """Return the value of each output for one sample; inputs (inputs,); `others` are refused."""
-        if others:
-            raise InputError(f"got {1 + len(others)} values by position, expected one sample, such as [1, 2], or names")
-        if named:
-            inputs = named if inputs is None else _one_of(inputs, named)
+        if named or others:
+            inputs = _one_of(inputs, others, named)
         if self._shortcut is not None:
             kind = type(inputs)
             plain = inputs if kind is list or kind is tuple else self._samples.plain(inputs)
@@ -113,18 +117,22 @@ class Arbiter:
         return tuple.__new__(self._result, self._engine.weights(self._samples.one(inputs)))  # type: ignore[arg-type]
 
     @overload
-    def batch(self, inputs: Columns, /) -> Result[Array]: ...
+    def batch(self, inputs: Columns, /, *, nan_policy: str = "raise") -> Result[Array]: ...
     @overload
-    def batch(self, inputs: ArrayLike, /) -> Array: ...
+    def batch(self, inputs: ArrayLike, /, *, nan_policy: str = "raise") -> Array: ...
     @overload
-    def batch(self, /, **columns: ArrayLike) -> Result[Array]: ...
-    def batch(self, inputs: Any = None, /, **columns: ArrayLike) -> Any:
+    def batch(self, /, *, nan_policy: str = "raise", **columns: ArrayLike) -> Result[Array]: ...
+    def batch(self, inputs: Any = None, /, *others: object, nan_policy: str = "raise", **columns: Any) -> Any:
         """Return the value of each output for many samples.
 
         Parameters
         ----------
         inputs : array_like, shape (n, inputs); or mapping, data frame, or array of named fields
             One sample in each row; or a column for each input, by name. Other columns of a data frame are passed over.
+        *others
+            Refused.
+        nan_policy : {"raise", "propagate"}
+            Treatment of rows with NaN: refused, or NaN for all outputs.
         **columns : array_like, shape (n,), or float
             Columns by keywords, in place of `inputs`; a single value counts for all rows.
 
@@ -146,27 +154,31 @@ class Arbiter:
         >>> Arbiter().batch(obstacle=[0.0, 1.0], shape=1.0, depth=0.5)["obstacle"].tolist()
         [0.0, 1.0]
         """
-        if columns:
-            inputs = _one_of(inputs, columns)
-        by_name = _is_table(inputs)
-        values, masked = self._samples.rows(self._samples.columns(inputs) if by_name else inputs)
-        weights = self._engine.weights_of_many(values)
-        if masked is not None:
-            weights = np.ma.MaskedArray(weights, np.broadcast_to(masked[:, None], weights.shape))
-        return tuple.__new__(self._result, weights.T) if by_name else weights
+        inputs = _one_of(inputs, others, columns, "rows, such as [[1, 2], [3, 4]]")
+        by_name = is_table(inputs)
+        table = self._samples.columns(inputs) if by_name else inputs
+        values, missing = self._samples.rows(table, nan_policy)
+        if missing.any():
+            result = np.full((len(values), len(self._system.outputs)), np.nan)
+            result[~missing] = self._engine.weights_of_many(values[~missing])
+        else:
+            result = self._engine.weights_of_many(values)
+        if isinstance(table, np.ma.MaskedArray):
+            result = np.ma.MaskedArray(result, np.broadcast_to(missing[:, None], result.shape))
+        return tuple.__new__(self._result, result.T) if by_name else result
 
-    def centroids(self, inputs: Sample | None = None, /, **named: float) -> Result[float]:
-        """Return the raw value of each output, before normalization; `inputs` or `named` are a sample, as for a call.
+    def centroids(self, inputs: Sample | None = None, /, *others: object, **named: float) -> Result[float]:
+        """Return the raw value of each output, before normalization; the arguments are those of a call.
 
         Where no rule fires it is the default, or NaN.
         """
-        return tuple.__new__(self._result, self._engine.centroids(self._samples.one(_one_of(inputs, named))))
+        return tuple.__new__(self._result, self._engine.centroids(self._samples.one(_one_of(inputs, others, named))))
 
-    def explain(self, inputs: Sample | None = None, /, **named: float) -> Explanation:
-        """Explain the decision for a sample, `inputs` or `named`: each rule's strength, and the rules that decided."""
+    def explain(self, inputs: Sample | None = None, /, *others: object, **named: float) -> Explanation:
+        """Explain the outputs for a sample, given as for a call: each rule's strength, and the rules that decided."""
         from fuzzy_arbiter.explanation import explain
 
-        return explain(self._engine, self._samples.one(_one_of(inputs, named)))
+        return explain(self._engine, self._samples.one(_one_of(inputs, others, named)))
 
     def verify(self, as_criteria: bool | None = None) -> Verification:
         """Check that the rules are complete and the terms have no gaps; `as_criteria` as for `verification.verify`."""
@@ -181,7 +193,7 @@ class Arbiter:
         engine: str = "auto",
         *,
         outside: Outside | None = None,
-        default: float | Mapping[str, float] | None = None,
+        default: float | str | Mapping[str, float | str] | None = None,
         block: str | None = None,
     ) -> Arbiter:
         """Return the arbiter that a file defines.
@@ -194,8 +206,9 @@ class Arbiter:
             Name of the engine, as for `Arbiter`.
         outside : {"refuse", "clip"}, optional
             Treatment of an input outside its universe, in place of the file's.
-        default : float or mapping from output's name to float, optional
-            Value of all outputs, or of the named ones, where no rule fires, in place of the file's.
+        default : float, "mid-range", or mapping from output's name to these, optional
+            Value of all outputs, or of the named ones, where no rule fires, in place of the file's; MATLAB takes the
+            middle of the universe.
 
         Raises
         ------
@@ -210,7 +223,7 @@ class Arbiter:
             system = _with_defaults(system, default)
         except DefinitionError as error:
             raise DefinitionError(f"{path}: {error}") from None
-        return cls(system=system, engine=engine)
+        return cls(system, engine=engine)
 
     def save(self, path: str | Path) -> None:
         """Write the definition to the file `path`, as `fuzzy_arbiter.formats.save` does."""
@@ -230,7 +243,7 @@ class Arbiter:
 
     def with_engine(self, engine: str) -> Arbiter:
         """Return an arbiter of the same system with another `engine`, as for `Arbiter`."""
-        return Arbiter(system=self._system, engine=engine)
+        return Arbiter(self._system, engine=engine)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuilt, (self._system, self.engine)
@@ -242,14 +255,21 @@ class Arbiter:
         return hash((self._system, self.engine))
 
     def __repr__(self) -> str:
-        return f"Arbiter(system={self._system!r}, engine={self.engine!r})"
+        return f"Arbiter({self._system!r}, engine={self.engine!r})"
 
     def __str__(self) -> str:
         return str(self._system)
 
+    def _repr_html_(self) -> str:
+        return self._system._repr_html_()
 
-def _one_of(inputs: Any, named: Mapping[str, Any]) -> Any:
-    """Return the inputs that were given by position or by keyword; refuse both at once."""
+
+def _one_of(
+    inputs: Any, others: Sequence[object], named: Mapping[str, Any], expected: str = "one sample, such as [1, 2]"
+) -> Any:
+    """Return the inputs that were given by position or by keyword; refuse both at once, and several by position."""
+    if others:
+        raise InputError(f"got {1 + len(others)} values by position, expected {expected}, or names")
     if not named:
         return inputs
     if inputs is not None:
@@ -257,26 +277,28 @@ def _one_of(inputs: Any, named: Mapping[str, Any]) -> Any:
     return named
 
 
-def _is_table(inputs: object) -> bool:
+def is_table(inputs: object) -> bool:
     """Return True for columns by name: a mapping, a data frame, an array of named fields."""
     if isinstance(inputs, np.ndarray):
         return inputs.dtype.names is not None
     return isinstance(inputs, Mapping) or hasattr(inputs, "columns")
 
 
-def _with_defaults(system: System, default: float | Mapping[str, float] | None) -> System:
+def _with_defaults(system: System, default: float | str | Mapping[str, float | str] | None) -> System:
     if default is None:
         return system
     names = variable_names(system.outputs)
-    each = default if isinstance(default, Mapping) else dict.fromkeys(names, default)
-    for name in each:
+    each: dict[str, Any] = dict(default if isinstance(default, Mapping) else dict.fromkeys(names, default))
+    for name, value in each.items():
         if name not in names:
             raise DefinitionError(f"default: no output {name!r}, expected one of {', '.join(names)}")
+        if value == "mid-range":
+            each[name] = sum(system[name].universe) / 2.0
     return replace(system, outputs=tuple(replace(o, default=each.get(o.name, o.default)) for o in system.outputs))
 
 
 def _rebuilt(system: System, engine: str) -> Arbiter:  # a name that pickles hold
-    return Arbiter(system=system, engine=engine)
+    return Arbiter(system, engine=engine)
 
 
-_DEFAULTS = (SECTION_VI, "hierarchical", WEIGHT, "range", "refuse", 101)
+_DEFAULTS = ("hierarchical", WEIGHT, "range", "refuse", 101)

@@ -13,6 +13,7 @@ from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import Anything, Is
 from fuzzy_arbiter.rule import Rule, parse_rule
 from fuzzy_arbiter.shapes import Membership
+from fuzzy_arbiter.table import html_of, rule_rows
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.terms.term import AutomaticTerms, Term
@@ -283,9 +284,8 @@ class System:
         for name in names:
             require_name(name, "weights_of")
         if len(names) not in (0, len(self.outputs)) or len(set(names)) < len(names):
-            raise DefinitionError(
-                f"weights_of is {shown(names)}, expected a name for each of the {len(self.outputs)} outputs, each once"
-            )
+            expected = f"a name for each of the {len(self.outputs)} outputs, each once"
+            raise DefinitionError(f"weights_of is {shown(names)}, expected {expected}")
         object.__setattr__(self, "weights_of", names)
         for key in ("inputs", "outputs", "rules"):
             if not getattr(self, key):
@@ -309,6 +309,13 @@ class System:
 
     def __str__(self) -> str:
         return "\n".join(f"R{i + 1}: {rule}" for i, rule in enumerate(self.rules))
+
+    def rule_table(self) -> list[dict[str, str]]:
+        """Return a row for each rule, with a column for each input where every condition only joins such by *and*."""
+        return rule_rows(self)
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
     def __repr__(self) -> str:
         """Return Python text that builds an equal system; rules are texts, and default settings are left out."""

@@ -1,4 +1,4 @@
-"""Explain weights: degrees of terms, strengths of rules, cuts of outputs, and the deciding rules."""
+"""Explain outputs: degrees of terms, strengths of rules, cuts of outputs, and the deciding rules."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ class FiredRule:
 
 @dataclass(frozen=True, slots=True)
 class OutputDecision:
-    """Derivation of one output's weight."""
+    """Derivation of one output's value."""
 
     name: str  # name in results: that of the criterion whose weight the output is, else the output's own
     variable: str  # name of the output in the rules
     cuts: dict[str, float]  # greatest strength of the rules that conclude each term
     centroid: float  # value in the universe, before it is normalized
-    weight: float  # weight from the arbiter; NaN if no rule fired and there is no default
+    value: float  # what a call returns; NaN if no rule fired and there is no default
     decided_by: str | None  # label of the rule that gives the greatest cut, of several the first; None if no rule fired
     runner_up: str | None  # label of the strongest rule for another term; None if none fired
     margin: float  # strength of the deciding rule less that of the runner-up; 0 is a tie
@@ -58,11 +58,12 @@ class OutputDecision:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """Derivation of the weights of one sample."""
+    """Derivation of the outputs of one sample."""
 
     inputs: tuple[InputDegrees, ...]  # inputs in the system's order
     rules: tuple[FiredRule, ...]  # all rules, also those that did not fire
     outputs: tuple[OutputDecision, ...]  # outputs in the system's order
+    ranked: bool  # true if the outputs are weights of criteria, which the following compares
     # the output with the maximum weight, by its name in results; None if that is shared, or all weights are 0. An
     # output that is NaN takes no part
     winner: str | None
@@ -71,17 +72,19 @@ class Explanation:
     tied: tuple[str, ...]  # the outputs that share the maximum weight, if it is not 0; none if there is a winner
 
     @property
-    def weights(self) -> Result[float]:
-        """The weights, as the arbiter gives them."""
-        return tuple.__new__(result_class([o.name for o in self.outputs]), [o.weight for o in self.outputs])
+    def result(self) -> Result[float]:
+        """The values of the outputs, as a call returns them."""
+        return tuple.__new__(result_class([o.name for o in self.outputs]), [o.value for o in self.outputs])
 
     def as_dict(self) -> dict[str, Any]:
         """Convert the explanation to values that JSON can represent."""
         data = asdict(self)
         for item in data["outputs"]:
-            item |= {key: None for key in ("centroid", "weight") if item[key] != item[key]}
+            item |= {key: None for key in ("centroid", "value") if item[key] != item[key]}
         for rule, item in zip(self.rules, data["rules"], strict=True):
             item["fired"] = rule.fired
+        if not data.pop("ranked"):
+            data = {key: data[key] for key in ("inputs", "rules", "outputs")}
         return {key: list(item) if isinstance(item, tuple) else item for key, item in data.items()}
 
     def __str__(self) -> str:
@@ -91,8 +94,8 @@ class Explanation:
         lines.append(f"rules that fired, {len(fired)} of {len(self.rules)}" if fired else "no rule fired")
         lines += aligned([(rule.label, f"{rule.strength:.6g}", _short(rule.text)) for rule in fired])
         lines.append("outputs")
-        lines += aligned([(_title(o), f"{o.weight:.6g}", _pairs(o.cuts), _decision(o)) for o in self.outputs])
-        if len(self.outputs) == 1:  # one output has no ranking
+        lines += aligned([(_title(o), f"{o.value:.6g}", _pairs(o.cuts), _decision(o)) for o in self.outputs])
+        if not self.ranked or len(self.outputs) == 1:
             return "\n".join(lines)
         if self.winner is not None:
             second = f", {self.margin:.6g} above {self.runner_up}" if self.runner_up is not None else ""
@@ -105,27 +108,28 @@ class Explanation:
 
 
 def explain(engine: Engine, inputs: Sequence[float]) -> Explanation:
-    """Explain the weights for one sample."""
+    """Explain the outputs for one sample."""
     system, firing = engine.system, engine.firing
     row = np.array([inputs], dtype=np.float64)  # a batch, in which an output without a rule that fires is no error
-    weights, centroids = engine.weights_of_many(row)[0].tolist(), engine.centroids_of_many(row)[0].tolist()
+    values, centroids = engine.weights_of_many(row)[0].tolist(), engine.centroids_of_many(row)[0].tolist()
     strengths = firing.strengths(inputs)
     rules = tuple(
         FiredRule(f"R{i + 1}", str(rule), strength, {c.variable: c.term for c in rule.conclusions})
         for i, (rule, strength) in enumerate(zip(system.rules, strengths, strict=True))
     )
     outputs = tuple(
-        _decided(system, rules, k, centroid, weight)
-        for k, (centroid, weight) in enumerate(zip(centroids, weights, strict=True))
+        _decided(system, rules, k, centroid, value)
+        for k, (centroid, value) in enumerate(zip(centroids, values, strict=True))
     )
     degrees = tuple(
         InputDegrees(v.name, float(x), {t.name: t.membership(x) for t in v.terms})
         for v, x in zip(system.inputs, inputs, strict=True)
     )
-    return Explanation(degrees, rules, outputs, *_ranking(system.result_names, weights))
+    ranking = _ranking(system.weights_of, values) if system.weights_of else (None, None, 0.0, ())
+    return Explanation(degrees, rules, outputs, bool(system.weights_of), *ranking)
 
 
-def _decided(system: System, rules: Sequence[FiredRule], k: int, centroid: float, weight: float) -> OutputDecision:
+def _decided(system: System, rules: Sequence[FiredRule], k: int, centroid: float, value: float) -> OutputDecision:
     output = system.outputs[k]
     cuts = dict.fromkeys(output.term_names, 0.0)
     concluding = [(rule.conclusions[output.name], rule) for rule in rules if output.name in rule.conclusions]
@@ -139,7 +143,7 @@ def _decided(system: System, rules: Sequence[FiredRule], k: int, centroid: float
         output.name,
         cuts,
         centroid,
-        weight,
+        value,
         first.label if first else None,
         second.label if second else None,
         (first.strength if first else 0.0) - (second.strength if second else 0.0),

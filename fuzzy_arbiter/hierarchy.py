@@ -44,7 +44,8 @@ class Criterion:
 
     Examples
     --------
-    >>> from fuzzy_arbiter import Arbiter, Criterion, rising
+    >>> from fuzzy_arbiter import Arbiter, rising
+    >>> from fuzzy_arbiter.criteria import Criterion
     >>> arbiter = Arbiter([Criterion("battery", membership=rising(0.0, 1.0)), Criterion("survey")])
     >>> weights = arbiter(battery=0.9, survey=1.0)
     >>> round(weights["battery"], 3), round(weights["survey"], 3)
@@ -123,7 +124,7 @@ def prioritized(
 
     Examples
     --------
-    >>> from fuzzy_arbiter import prioritized
+    >>> from fuzzy_arbiter.criteria import prioritized
     >>> len(prioritized().rules), len(prioritized(form="complete").rules)
     (8, 24)
     """

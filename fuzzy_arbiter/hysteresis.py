@@ -60,7 +60,8 @@ class HysteresisArbiter:
 
     Examples
     --------
-    >>> from fuzzy_arbiter import Arbiter, HysteresisArbiter
+    >>> from fuzzy_arbiter import Arbiter
+    >>> from fuzzy_arbiter.criteria import HysteresisArbiter
     >>> steady = HysteresisArbiter(Arbiter(), enter=0.8, release=0.2)
     >>> [steady([degree, 0.0, 0.0], 0.1 * i)[0] for i, degree in enumerate([0.7, 0.9, 0.3, 0.1])]
     [0.0, 1.0, 1.0, 0.0]

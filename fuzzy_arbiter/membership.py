@@ -21,7 +21,7 @@ def ramp(clearance: float, width: float) -> float:
 
     Examples
     --------
-    >>> from fuzzy_arbiter import ramp
+    >>> from fuzzy_arbiter.criteria import ramp
     >>> ramp(-0.1, 0.2), ramp(0.05, 0.2), ramp(0.3, 0.2)
     (1.0, 0.75, 0.0)
     """

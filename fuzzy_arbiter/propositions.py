@@ -56,6 +56,12 @@ class Proposition:
         for part in self.inner:
             yield from part.parts_within()
 
+    def by_variable(self) -> dict[str, str] | None:
+        """Return the words on each variable, if this joins statements on different variables by *and*."""
+        parts = self.inner if isinstance(self, And) else (self,)
+        words = dict(map(_words, parts)) if all(map(_on_one, parts)) else {}
+        return words if len(words) == len(parts) else None
+
     def terms(self) -> Iterator[Is]:
         """Yield every statement about a term, from left to right."""
         return (part for part in self.parts_within() if isinstance(part, Is))

@@ -16,6 +16,7 @@ from fuzzy_arbiter.errors import InputError
 from fuzzy_arbiter.shapes import Array
 
 _NUMBER: Any = (Real, np.bool_)
+NAN_POLICIES = ("raise", "propagate")
 EDGE = 1e-9  # distance from a universe, as a fraction of its width, within which an input counts as its end
 
 
@@ -67,40 +68,46 @@ class Samples:
 
     def many(self, inputs: ArrayLike) -> Array:
         """Return the values of many samples; inputs (n, inputs), returns (n, inputs)."""
-        values, masked = self.rows(inputs)
-        if masked is not None and masked.any():
-            raise InputError(f"row {int(np.argmax(masked))}: a value is masked, expected none")
+        values, missing = self.rows(inputs)
+        if missing.any():
+            raise InputError(f"row {int(np.argmax(missing))}: a value is masked, expected none")
         return values
 
-    def rows(self, inputs: ArrayLike) -> tuple[Array, NDArray[np.bool_] | None]:
-        """Return the values of many samples, and a mask of the rows with masked values."""
+    def rows(self, inputs: ArrayLike, nan_policy: str = "raise") -> tuple[Array, NDArray[np.bool_]]:
+        """Return the values of many samples, and True for those that are masked or, where asked for, NaN."""
+        if nan_policy not in NAN_POLICIES:
+            raise InputError(f"nan_policy is {shown(nan_policy)}, expected {' or '.join(NAN_POLICIES)}")
         try:
             received = np.asarray(inputs)
             if received.dtype.kind not in "biufO":  # NumPy would read numbers from texts, too
                 raise TypeError(f"got values of the type {received.dtype.name}")
             if received.dtype.kind == "O" and any(isinstance(x, str | bytes) for x in received.flat):
                 raise TypeError("got a text among the values")
-            masked = np.ma.getmaskarray(inputs) if isinstance(inputs, np.ma.MaskedArray) else None
-            if masked is not None and masked.shape == received.shape == (len(received), len(self._names)):
-                masked = np.asarray(masked.any(axis=1))
-                received = np.where(masked[:, None], np.array(self._limits).T[0], received)
+            if isinstance(inputs, np.ma.MaskedArray):
+                received = np.where(masked := np.ma.getmaskarray(inputs), 0.0, received)
+            else:
+                masked = np.zeros(received.shape, dtype=bool)
             values = received.astype(np.float64, copy=False)
         except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"inputs: {error}; expected rows of numbers for {', '.join(self._names)}") from None
         if values.ndim != 2 or values.shape[1] != len(self._names):
             raise InputError(f"inputs have the shape {values.shape}, expected (n, {len(self._names)})")
         low, high = np.array(self._limits).T
+        missing: NDArray[np.bool_] = np.asarray(masked.any(axis=1))
         if values.size and low.max() <= values.min() and values.max() <= high.min():  # for NaN neither holds
-            return values, masked
+            return values, missing
+        if nan_policy == "propagate":
+            missing |= np.isnan(values).any(axis=1)
+        values = np.where(missing[:, None], low, values)
         edge = np.array(self._tolerance)
         valid = ~np.isnan(values) if self._clips else (low - edge <= values) & (values <= high + edge)
         if not valid.all():
             row, i = np.argwhere(~valid)[0]
             expected = f"expected a number in [{low[i]:g}, {high[i]:g}]"
             if np.isnan(values[row, i]):
-                expected += ", or rows masked by numpy.ma.masked_invalid"
+                expected += ", or nan_policy='propagate'"
             raise InputError(f"row {row}: {self._names[i]} is {float(values[row, i])!r}, {expected}")
-        return np.clip(values, low, high), masked
+        return np.clip(values, low, high), missing
 
     def columns(self, inputs: Columns) -> Array:
         """Return columns by name as rows, in a masked array if one of them is masked; returns (n, inputs)."""

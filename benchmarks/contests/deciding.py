@@ -14,7 +14,8 @@ from benchmarks.law import LawSteps
 from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import peer
 from benchmarks.timing import Contestant, Own
-from fuzzy_arbiter import SECTION_VI, Arbiter
+from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter.criteria import SECTION_VI
 
 POINTS = 101  # number of points of scikit-fuzzy's universes
 LAWS = ("ismail_dunnigan", "deployable")

@@ -77,7 +77,7 @@ def require_fused(scenario: Scenario, what: str = "flights without a record") ->
 def _fixed_keys(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
     """Return the present and the required value of each key that has to have a fixed value."""
     return {
-        "arbiter.engine": (scenario.arbiter.engine, Arbiter(system=scenario.rules.system).engine),
+        "arbiter.engine": (scenario.arbiter.engine, Arbiter(scenario.rules.system).engine),
         "master.order": (scenario.master.order, "gauss-seidel"),
         "plant.fmi": (scenario.plant.fmi, 3),
         "commands.enabled": (scenario.commands.enabled, False),

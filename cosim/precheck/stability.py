@@ -98,7 +98,7 @@ def start_weights(scenario: Scenario) -> Array:
     signals = empty_signals(packed, len(secondary), len(scenario.criteria))
     goal, regions = pack([scenario.goal_region]), pack(secondary)
     BoundCall(compute_inputs, (packed, goal, regions, state, 0.0, clearances, signals)).call()
-    weights = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)(signals.inputs.tolist())
+    weights = Arbiter(scenario.rules.system, engine=scenario.arbiter.engine)(signals.inputs.tolist())
     return np.array(weights)[list(scenario.criterion_places)]
 
 

@@ -16,7 +16,8 @@ from cosim.errors import ScenarioError
 from cosim.scenario.criteria import PAPER, CriterionSetup
 from cosim.scenario.region_tables import SecondaryRegion
 from cosim.scenario.tables import ArbiterSetup, RuleVariant
-from fuzzy_arbiter import Arbiter, ArbiterError, Rule, Shape, System, Term, Variable, prioritized
+from fuzzy_arbiter import Arbiter, ArbiterError, Rule, Shape, System, Term, Variable
+from fuzzy_arbiter.criteria import prioritized
 from fuzzy_arbiter.files import read_text
 from fuzzy_arbiter.formats import FORMATS, reads
 from plant_fmu.toml_tables import hint
@@ -106,7 +107,7 @@ def check_rules(
         raise ScenarioError(f"arbiter.rules is {setup.rules!r}, expected none beside arbiter.file, which has its own")
     system = _system(setup.file, setup.text, tuple(criterion.name for criterion in criteria), setup.points)
     try:
-        engine = Arbiter(system=system, engine=setup.engine).engine
+        engine = Arbiter(system, engine=setup.engine).engine
     except ArbiterError as error:
         raise ScenarioError(
             f"arbiter.engine is {setup.engine!r}, expected another one for {setup.file}: {error}"
@@ -175,7 +176,7 @@ def _require_weights(file: str, system: System) -> None:
                 'or normalization "range"'
             )
     without = [output.name for output in system.outputs if output.default is None]
-    if without and not _always_fires(Arbiter(system=system)):
+    if without and not _always_fires(Arbiter(system)):
         raise ScenarioError(
             f"arbiter.file: {file}: output {without[0]!r} has no default, expected one: "
             "it is not proved that a rule fires for all inputs"

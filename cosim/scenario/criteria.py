@@ -13,7 +13,7 @@ from controller.regions.region_set import of_attitude
 from cosim.errors import ScenarioError
 from cosim.scenario.membership_terms import read_term, term_in_words
 from cosim.scenario.region_tables import PAPER_CRITERIA, CriterionEntry, SecondaryRegion
-from fuzzy_arbiter import SECTION_VI, Criterion
+from fuzzy_arbiter.criteria import SECTION_VI, Criterion
 from fuzzy_arbiter.propositions import is_identifier
 from fuzzy_arbiter.shapes import Membership
 from plant_fmu.toml_tables import hint

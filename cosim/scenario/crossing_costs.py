@@ -39,7 +39,7 @@ def _costs(
     rules: ArbiterRules, criteria: tuple[str, ...], soft: tuple[str, ...], of_regions: tuple[str, ...], depth: float
 ) -> dict[str, float]:
     """Return the cost of each criterion with soft regions [m]."""
-    arbiter = Arbiter(system=rules.system)
+    arbiter = Arbiter(rules.system)
 
     def value(signal: InputSignal, far: float, pressing: Sequence[str]) -> float:
         """Return the value of an input while two criteria have membership 1; `far` is its upper bound."""

@@ -129,7 +129,7 @@ def bind_rules(system: System, data: StepData) -> CompiledRules | BoundCall:
     """Bind rules to the arrays of a step in C; in Python where that runs all functions."""
     if os.environ.get(INTERPRETED):
         call: CompiledRules | BoundCall = BoundCall(
-            _PythonRules(Arbiter(system=system)), (data.signals.inputs, data.by_criterion)
+            _PythonRules(Arbiter(system)), (data.signals.inputs, data.by_criterion)
         )
     else:
         call = CompiledRules(system, data.signals.inputs, data.by_criterion)

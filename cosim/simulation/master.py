@@ -111,7 +111,7 @@ class Master:
         if plant is not None:
             validate_plant(plant, scenario.vehicle)
         self.scenario = scenario
-        self._arbiter = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)
+        self._arbiter = Arbiter(scenario.rules.system, engine=scenario.arbiter.engine)
         self._law: Law = law_of(scenario) if law is None else law
         self._boundary = 0.0  # s, beginning of the next step
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from cosim.scenario.criteria import CriterionSetup
 from cosim.scenario.region_tables import SecondaryRegion
 from cosim.step.curves import PackedCurves, curve_degree, pack_curves
-from fuzzy_arbiter import Shape, ramp
+from fuzzy_arbiter import Shape
+from fuzzy_arbiter.criteria import ramp
 
 Array = NDArray[np.float64]
 

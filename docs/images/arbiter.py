@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from small import write
 
-from fuzzy_arbiter import Arbiter, Criterion, pictures, rising
+from fuzzy_arbiter import Arbiter, pictures, rising
+from fuzzy_arbiter.criteria import Criterion
 
 SMOKE = Criterion("smoke", on="present", off="absent", membership=rising(0.5, 3.0))
 AIR = Criterion("co2", on="stale", off="fresh", membership=rising(800.0, 1400.0))

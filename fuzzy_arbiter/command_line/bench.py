@@ -27,7 +27,7 @@ def bench(system: System) -> str:
     costs: dict[str, tuple[float, float, int] | str] = {}  # of a call and of a row [us], rows; or why there are none
     for name in ENGINES[1:]:
         try:
-            arbiter = Arbiter(system=system, engine=name)
+            arbiter = Arbiter(system, engine=name)
         except EngineError as error:
             costs[name] = str(error)
             continue

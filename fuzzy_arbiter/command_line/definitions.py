@@ -42,7 +42,8 @@ def described(arbiter: Arbiter) -> str:
     for heading, variables in (("inputs", system.inputs), ("outputs", system.outputs)):
         lines += [heading, *(line for variable in variables for line in _described(variable))]
     lines += ["", "rules", *(f"  {line}" for line in str(system).splitlines()), ""]
-    norms = ("conjunction", "disjunction", "implication", "normalization", "outside", "points")
+    norms = ["conjunction", "disjunction", "implication", "outside", "points"]
+    norms[3:3] = ["normalization"] if system.normalization != "none" else []
     lines += [f"{name:14} {getattr(system, name)}" for name in norms]
     return "\n".join([*lines, f"{'engine':14} {arbiter.engine}: {arbiter.engine_reason}"])
 

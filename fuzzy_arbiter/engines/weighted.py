@@ -22,7 +22,7 @@ class Weighted(Defuzzifier):
 
     def __init__(self, output: Output, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         self._mean = output.defuzzifier == "average"
-        self._values = [_function(term.shape, inputs, outputs) for term in output.terms]
+        self._values = [value_function(term.shape, inputs, outputs) for term in output.terms]
 
     def value(self, cuts: Sequence[float], inputs: Sequence[float]) -> float:
         """Return the output's value for one sample."""
@@ -44,7 +44,7 @@ class Weighted(Defuzzifier):
         return total / weight if self._mean else total
 
 
-def _function(shape: Any, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Any, Any], Any]:
+def value_function(shape: Any, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Any, Any], Any]:
     """Return a function from the strengths and the inputs to the values: numbers, or arrays for many samples."""
     if isinstance(shape, Constant):
         return lambda cut, columns: shape.value

@@ -133,6 +133,8 @@ def _require_count(section: Block, key: str, count: int) -> None:
 def _defuzzifier(system: Block) -> Any:
     """Return the defuzzifier of all outputs; in a hybrid file those of values take the weighted mean."""
     kind = system.entry("Type")[1] or "mamdani"
+    if re.search(r"type-?2$", kind):
+        refuse(system.entry("Type")[0], f"Type is {kind}, a type-2 system; expected one of type 1")
     weighted = system.word("Type", {**_TYPES, "": False})
     line, word = system.entry("DefuzzMethod")
     word = word or ("centroid" if kind == "mamdani" else "wtaver")

@@ -42,7 +42,7 @@ def fold_normalization(system: System) -> System:
 
     Examples
     --------
-    >>> from fuzzy_arbiter import prioritized
+    >>> from fuzzy_arbiter.criteria import prioritized
     >>> from fuzzy_arbiter.formats import fold_normalization
     >>> fold_normalization(prioritized()).outputs[0].universe
     (-1.0, 2.0)

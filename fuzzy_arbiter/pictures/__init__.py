@@ -1,4 +1,4 @@
-"""Pictures of an arbiter: its terms, its rules at a sample, and its weights over its inputs.
+"""Pictures of a system: its terms, its rules at a sample, and its outputs over its inputs.
 
 Every function draws on the axes that it is given, or on those of a new figure, and returns them; none shows or saves
 anything. Matplotlib is needed only when one is called.
@@ -9,14 +9,13 @@ Imports: terms, engines.
 import warnings
 
 from fuzzy_arbiter.pictures.fields import decisions, surface
-from fuzzy_arbiter.pictures.lines import normalizations, profile, terms
+from fuzzy_arbiter.pictures.lines import profile, terms
 from fuzzy_arbiter.pictures.rule_picture import rules
 from fuzzy_arbiter.pictures.style import COLORS
 
 __all__ = [
     "COLORS",
     "decisions",
-    "normalizations",
     "profile",
     "rules",
     "surface",

@@ -2,39 +2,29 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import Normalization, Output
-from fuzzy_arbiter.errors import DefinitionError, InputError, UnsupportedError
+from fuzzy_arbiter.definition import Output, System, Variable, variable_names
+from fuzzy_arbiter.errors import InputError, UnsupportedError
 from fuzzy_arbiter.pictures.places import fixed_inputs, format_values, index_of, points_along, weights_at
 from fuzzy_arbiter.pictures.style import (
     FAINT,
-    INK,
     legend_above,
-    legend_style,
     line_style,
     new_axes,
-    require_matplotlib,
-    room,
     tidy,
 )
 from fuzzy_arbiter.shapes import Shape
 from fuzzy_arbiter.terms.term import Term
+from fuzzy_arbiter.terms.values import Value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-_MEANING: dict[Normalization, str] = {
-    "none": "the centroids themselves",
-    "range": "each from its least to its greatest",
-    "sum": "then divided by their sum",
-    "max": "then divided by the greatest",
-}
 
 
 def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | None = None) -> Axes:
@@ -63,7 +53,7 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
     InputError
         If the position is outside the universe.
     UnsupportedError
-        If the variable has no terms, or its terms are values.
+        If the variable has no terms.
 
     Examples
     --------
@@ -77,20 +67,42 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
     low, high = selected.universe
     if at is not None and not low <= at <= high:
         raise InputError(f"{variable}: position is {at!r}, expected a number in [{low:g}, {high:g}]")
-    if not selected.terms or (isinstance(selected, Output) and selected.weighted):
-        raise UnsupportedError(f"terms of {variable!r}: it has values or none, which are not drawn; expected sets")
+    if not selected.terms:
+        raise UnsupportedError(f"terms of {variable!r}: it has none to draw")
     ax = new_axes(6.0, 2.7) if ax is None else ax
+    spans = value_spans(arbiter.system, selected)
     for i, term in enumerate(selected.terms):
-        x, y = corners(term, (low, high))
+        if term.name in spans:  # a stem, or the range of a value that depends on the inputs
+            start, end = spans[term.name]
+            low, high = min(low, start), max(high, end)
+            x, y = [start, start, end, end], [0.0, 1.0, 1.0, 0.0]
+        else:
+            x, y = corners(term, (low, high))
+            if at is not None:
+                ax.plot(at, term.membership(at), "o", color=line_style(i)["color"], clip_on=False, zorder=4)
         ax.plot(x, y, label=term.name, clip_on=False, **line_style(i))
-        if at is not None:
-            ax.plot(at, term.membership(at), "o", color=line_style(i)["color"], clip_on=False, zorder=4)
     if at is not None:
         ax.axvline(at, color=FAINT, linewidth=1.0, zorder=1)
-    ax.set(xlim=(low, high), ylim=(0.0, 1.0), xlabel=variable, ylabel="degree")
+    ax.set(xlim=(low, high), ylim=(0.0, 1.0), xlabel=variable, ylabel="strength" if spans else "degree")
     tidy(ax)
     legend_above(ax, selected.term_names)
     return ax
+
+
+def value_spans(system: System, variable: Variable) -> dict[str, tuple[float, float]]:
+    """Return the least and the greatest value of each term that is a value, over samples of the inputs."""
+    corners = itertools.islice(itertools.product(*(v.universe for v in system.inputs)), 1024)
+    low, high = np.array([v.universe for v in system.inputs]).T
+    samples = np.array([*corners, *np.random.default_rng(0).uniform(low, high, (1024, len(low)))]).T
+    names, spans = variable_names(system.inputs), {}
+    for term in variable.terms if isinstance(variable, Output) and variable.weighted else ():
+        if isinstance(term.shape, Value):
+            whole = term.shape.expression(names, variable_names(system.outputs))
+            known = dict(zip(names, samples, strict=True)) | dict.fromkeys(variable_names(system.outputs), np.nan)
+            values = np.broadcast_to(whole.of_many(known), samples.shape[1:])
+            values = values[np.isfinite(values)]
+            spans[term.name] = (float(values.min()), float(values.max())) if values.size else variable.universe
+    return spans
 
 
 def corners(term: Term, universe: tuple[float, float]) -> tuple[list[float], list[float]]:
@@ -151,73 +163,9 @@ def profile(
     ax = new_axes(6.0, 3.2) if ax is None else ax
     for k, name in enumerate(system.result_names):
         ax.plot(x, weights[:, k], label=name, clip_on=False, **line_style(k))
-    ax.set(xlim=(low, high), xlabel=over, ylabel="centroid" if system.normalization == "none" else "weight")
+    ax.set(xlim=(low, high), xlabel=over, ylabel="weight" if system.weights_of else "value")
     if system.normalization != "none":
         ax.set_ylim(0.0, 1.0)
     tidy(ax)
     legend_above(ax, system.result_names, f"at {format_values(fixed)}" if fixed else "")
     return ax
-
-
-def normalizations(
-    arbiter: Arbiter,
-    over: str,
-    at: Mapping[str, float] | None = None,
-    axes: Mapping[Normalization, Axes] | None = None,
-) -> dict[Normalization, Axes]:
-    """Draw all weights along one input, once under each normalization; the arbiter's own does not matter.
-
-    Parameters
-    ----------
-    arbiter, over, at
-        As for `profile`.
-    axes : mapping from str to Axes, optional
-        Axes of each normalization to draw; default: four of a new figure.
-
-    Returns
-    -------
-    dict of Axes by str
-        Axes of the picture, by normalization.
-
-    Raises
-    ------
-    DefinitionError, InputError
-        As for `profile`, and if there is no such normalization.
-
-    Examples
-    --------
-    >>> from fuzzy_arbiter import Arbiter
-    >>> from fuzzy_arbiter.pictures import normalizations
-    >>> sorted(normalizations(Arbiter(), over="obstacle"))
-    ['max', 'none', 'range', 'sum']
-    """
-    fixed = fixed_inputs(arbiter, (over,), at)
-    new = axes is None
-    if axes is None:
-        require_matplotlib()
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(8.2, 5.4), layout="constrained")
-        axes = dict(zip(_MEANING, figure.subplots(2, 2, sharex=True).flat, strict=True))
-    for name, ax in axes.items():
-        if name not in _MEANING:
-            raise DefinitionError(f"no normalization {name!r}, expected one of {', '.join(_MEANING)}")
-        system = replace(arbiter.system, normalization=name)
-        profile(Arbiter(system=system, engine=arbiter.engine), over, fixed, ax)
-        legend = ax.get_legend()
-        assert legend is not None
-        legend.remove()
-        ax.set_title(f"{name}: {_MEANING[name]}", fontsize=10, loc="left", color=INK)
-        if name == "none" and all(v.universe == (0.0, 1.0) for v in system.outputs):
-            ax.set_ylim(0.0, 1.0)  # as the others
-        if new:
-            ax.label_outer()
-    first = next(iter(axes.values()))
-    handles, labels = first.get_legend_handles_labels()
-    where = f"at {format_values(fixed)}" if fixed else ""
-    if new:
-        style = legend_style(labels, where, 2 * room(first))
-        first.figure.legend(handles, labels, loc="outside upper left", frameon=False, **style)
-    else:  # outside is what only some layouts know
-        first.legend(loc="best", framealpha=0.8, **legend_style(labels, where, room(first)))
-    return dict(axes)

@@ -1,7 +1,9 @@
-"""A picture of the rules at one sample: each rule's strength and clipped term, the joined outline, its centroid."""
+"""A picture of the rules at one sample: each rule's strength and clipped term, the joined outline, its value."""
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,14 +11,15 @@ import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import Output, variable_names
-from fuzzy_arbiter.engines.firing import Firing
-from fuzzy_arbiter.errors import UnsupportedError
+from fuzzy_arbiter.engines.firing import Firing, Slot
+from fuzzy_arbiter.engines.weighted import value_function
 from fuzzy_arbiter.pictures.lines import corners
 from fuzzy_arbiter.pictures.places import format_values, output_index, points_along
 from fuzzy_arbiter.pictures.style import FAINT, INK, color, hatch, new_axes, wrapped
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.samples import Sample
-from fuzzy_arbiter.shapes import Array
+from fuzzy_arbiter.shapes import Array, Membership
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,11 +31,11 @@ _TALL = 1.6  # factor of the height of the outline at the foot
 
 
 def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes | None = None) -> Axes:
-    """Draw the rules that fire for an output at a sample, and the centroid of their joined terms.
+    """Draw the rules that fire for an output at a sample, and the value of their joined terms.
 
-    Each row is a rule: its condition, the term that it concludes, clipped (or scaled) at the rule's strength, and that
-    strength, in bold and with a dot where none is greater for the term. At the foot all rows are joined by their
-    maximum, with the centroid. Of many rules those that do not fire are left out, then the weakest.
+    Each row is a rule: its condition, the term that it concludes, bounded by the rule's strength (a value is a stem of
+    that height), and that strength, in bold and with a dot where none is greater for the term. At the foot all rows
+    are joined, with the output's value. Of many rules those that do not fire are left out, then the weakest.
 
     Parameters
     ----------
@@ -56,8 +59,6 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
         If there is no such output.
     InputError
         If an input is missing, unknown, not a number, or outside its universe.
-    UnsupportedError
-        If the output's terms are values instead of areas.
 
     Examples
     --------
@@ -71,14 +72,9 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     variable = system.outputs[k]
     values = arbiter.samples.one(inputs)
     firing = Firing(system)
-    implications = {slot.implication for slot in firing.slots[k]}
-    if variable.weighted or variable.aggregation != "max" or not implications < {"min", "prod"}:
-        raise UnsupportedError(
-            f"rules of {variable.name!r}: its values, or terms under {', '.join(sorted(implications))} joined by "
-            f"{variable.aggregation}, are not drawn; expected terms under min or prod, joined by max"
-        )
     strengths = firing.strengths(values)
     cuts = firing.cuts(strengths)[k]
+    outline = _Outline(arbiter, k, values)
 
     concluding = [
         _Row(f"R{i + 1}", rule, strength, variable.term_names.index(conclusion.term))
@@ -94,28 +90,58 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     lines = sum(label.count("\n") for label in labels)
     ax = new_axes(7.2, 1.3 + 0.58 * len(rows) + 0.1 * lines + 0.95) if ax is None else ax
 
-    x = points_along(variable, 801)
-    degrees = [term.membership.of_many(x) for term in variable.terms]
-    bound = np.multiply if implications == {"prod"} else np.minimum
     for line, row in enumerate(rows):  # rows are counted downwards
-        _draw_row(ax, variable, line, row, (x, bound(degrees[row.term], row.strength)), cuts[row.term])
+        implication = (row.rule.operators or system).implication
+        top = max(other.strength for other in concluding if other.term == row.term)
+        _draw_row(ax, variable, line, row, outline.of_term(row.term, row.strength, implication), row.strength == top)
     foot = len(rows) + _TALL - 0.6
     tall = _TALL * _HEIGHT
-    joined = np.max([bound(*pair) for pair in zip(degrees, cuts, strict=True)], axis=0)
-    ax.plot(variable.universe, [foot, foot], color=INK, linewidth=1.0)
-    ax.fill_between(x, foot, foot - tall * joined, facecolor="#d9d9d9", linewidth=0)
-    ax.plot(x, foot - tall * joined, color=INK, linewidth=1.8)
-    text = _centroid(ax, arbiter, values, k, (foot, tall), any(cuts))
+    ax.plot(outline.universe, [foot, foot], color=INK, linewidth=1.0)
+    for x, joined in outline.joined(firing.slots[k], cuts):
+        ax.fill_between(x, foot, foot - tall * joined, facecolor="#d9d9d9", linewidth=0)
+        ax.plot(x, foot - tall * joined, color=INK, linewidth=1.8)
+    text = _value(ax, arbiter, values, k, (foot, tall), any(cuts))
 
     hidden = len(concluding) - len(rows)
     joined_label = "joined" + (f"\n({hidden} rules not drawn)" if hidden else "")
     ax.set_yticks([*(line - 0.12 for line in range(len(rows))), foot - tall / 2.6], [*labels, joined_label])
     ax.tick_params(axis="y", length=0, pad=8, labelsize=9)
-    ax.set(xlim=variable.universe, ylim=(foot + 0.02, -1.0 + 0.15), xlabel=variable.name)
+    ax.set(xlim=outline.universe, ylim=(foot + 0.02, -1.0 + 0.15), xlabel=variable.name)
     ax.spines[["top", "right", "left"]].set_visible(False)
     heading = f"{format_values(dict(zip(variable_names(system.inputs), values, strict=True)))}  →  {text}"
     ax.set_title(wrapped(heading, 64), fontsize=10, loc="right", pad=8)
     return ax
+
+
+class _Outline:
+    """Outlines of the terms of the k-th output, each bounded by a strength; of values, stems."""
+
+    def __init__(self, arbiter: Arbiter, k: int, values: Sequence[float]) -> None:
+        system = arbiter.system
+        self.output = output = system.outputs[k]
+        self.universe = output.universe
+        if not output.weighted:
+            self._x = points_along(output, 801)
+            return
+        names = variable_names(system.inputs), variable_names(system.outputs[:k])
+        self._known = (*values, *arbiter.centroids(values)[:k]) if k else values
+        self._values = [value_function(term.shape, *names) for term in output.terms]
+
+    def of_term(self, term: int, strength: float, implication: str) -> tuple[Array, Array]:
+        """Return positions and heights of a term that is bounded by a strength."""
+        if not self.output.weighted:
+            heights = T_NORMS[implication].array(strength, self.output.terms[term].membership.of_many(self._x))
+            return self._x, heights
+        position = self._values[term](strength, self._known) if strength > 0.0 else self.universe[0]
+        self.universe = min(self.universe[0], position), max(self.universe[1], position)
+        return np.full(2, position), np.array([0.0, strength])
+
+    def joined(self, slots: Sequence[Slot], cuts: Sequence[float]) -> list[tuple[Array, Array]]:
+        """Return the joined outline, or the stems of all values that fire."""
+        outlines = [self.of_term(s.term, cut, s.implication) for s, cut in zip(slots, cuts, strict=True) if cut > 0.0]
+        if self.output.weighted or not outlines:
+            return outlines
+        return [(self._x, functools.reduce(AGGREGATIONS[self.output.aggregation].array, (y for _, y in outlines)))]
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,20 +160,21 @@ class _Row:
         return "\n".join(lines if len(lines) <= 4 else [*lines[:2], f"{lines[2]} …", lines[-1]])
 
 
-def _draw_row(ax: Axes, variable: Output, baseline: int, row: _Row, outline: tuple[Array, Array], cut: float) -> None:
+def _draw_row(ax: Axes, variable: Output, baseline: int, row: _Row, outline: tuple[Array, Array], top: bool) -> None:
     """Draw the term of a rule, its part below the rule's strength, and that strength."""
     term = variable.terms[row.term]
     x, degrees = outline
     fires = row.strength > 0.0
-    decides = fires and row.strength == cut
+    decides = fires and top
     ax.plot(variable.universe, [baseline, baseline], color=FAINT, linewidth=0.7)
-    ends, whole = corners(term, variable.universe)
-    ax.plot(ends, baseline - _HEIGHT * np.array(whole), color=FAINT, linewidth=1.0)
+    if isinstance(term.shape, Membership):
+        ends, whole = corners(term, variable.universe)
+        ax.plot(ends, baseline - _HEIGHT * np.array(whole), color=FAINT, linewidth=1.0)
     if fires:
-        top, ink = baseline - _HEIGHT * degrees, color(row.term)
-        ax.fill_between(x, baseline, top, facecolor=ink, alpha=0.45, linewidth=0)
-        ax.fill_between(x, baseline, top, facecolor="none", edgecolor=ink, hatch=hatch(row.term), linewidth=0)
-        ax.plot(x, top, color=ink, linewidth=1.6)
+        line, ink = baseline - _HEIGHT * degrees, color(row.term)
+        ax.fill_between(x, baseline, line, facecolor=ink, alpha=0.45, linewidth=0)
+        ax.fill_between(x, baseline, line, facecolor="none", edgecolor=ink, hatch=hatch(row.term), linewidth=0)
+        ax.plot(x, line, color=ink, linewidth=1.6)
     ax.annotate(
         f"{row.strength:.3f} {term.name}" + (" •" if decides else ""),
         (1.0, baseline), xycoords=("axes fraction", "data"), xytext=(8, 4), textcoords="offset points",
@@ -156,12 +183,12 @@ def _draw_row(ax: Axes, variable: Output, baseline: int, row: _Row, outline: tup
     )  # fmt: skip
 
 
-def _centroid(ax: Axes, arbiter: Arbiter, values: Sample, k: int, place: tuple[float, float], fires: bool) -> str:
-    """Draw the centroid at the foot, and return the output's value in words."""
+def _value(ax: Axes, arbiter: Arbiter, values: Sample, k: int, place: tuple[float, float], fires: bool) -> str:
+    """Draw the raw value at the foot, and return the output's value in words."""
     output = arbiter.system.outputs[k]
     foot, tall = place
     if fires:
-        center, meaning = arbiter.centroids(values)[k], "centroid"
+        center, meaning = arbiter.centroids(values)[k], str(output.defuzzifier)
     elif output.default is not None:
         center, meaning = output.default, "default"
     else:

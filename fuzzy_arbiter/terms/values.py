@@ -56,7 +56,7 @@ class Constant(Value):
         return Expression("", self.value)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, init=False)
 class Linear(Value):
     """A sum of the inputs, each times its coefficient, and of a constant.
 
@@ -82,8 +82,11 @@ class Linear(Value):
     coefficients: tuple[float, ...]
     constant: float = 0.0
 
-    def __post_init__(self) -> None:
-        all_numbers = (*all_of(object, self.coefficients, "linear", "a sequence of numbers"), self.constant)
+    def __init__(self, coefficients: Sequence[float], constant: float = 0.0, *others: object) -> None:
+        if others:
+            what = f"got {2 + len(others)} arguments, expected coefficients and a constant, such as Linear((1, 2), 3)"
+            raise DefinitionError(f"linear: {what}")
+        all_numbers = (*all_of(object, coefficients, "linear", "a sequence of numbers"), constant)
         numbers = finite_numbers(all_numbers)
         if numbers is None:
             raise DefinitionError(f"linear: got {shown(all_numbers)}, expected finite numbers")

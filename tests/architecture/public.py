@@ -19,6 +19,7 @@ PUBLIC = {
     "controller.regions": "",
     "cosim": "",
     "fuzzy_arbiter": "",
+    "fuzzy_arbiter.criteria": "",
     "fuzzy_arbiter.export": "",
     "fuzzy_arbiter.formats": "fold_normalization load reads save writes",
     "fuzzy_arbiter.pictures": "",

@@ -54,7 +54,7 @@ def gap(tmp_path):
     wind = Variable("wind", (0, 20), {"calm": falling(2, 6), "strong": rising(8, 12)})
     sail = Output("sail", (0, 1), {"none": falling(0, 1), "full": rising(0, 1)})
     rules = ("if wind is calm then sail is full", "if wind is strong then sail is none")
-    Arbiter(system=System((wind,), (sail,), rules, name="gap")).save(tmp_path / "gap.json")
+    Arbiter(System((wind,), (sail,), rules, name="gap")).save(tmp_path / "gap.json")
     return tmp_path / "gap.json"
 
 

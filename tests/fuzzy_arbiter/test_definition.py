@@ -7,19 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzy_arbiter import (
-    Criterion,
-    Output,
-    Rule,
-    Shape,
-    System,
-    Term,
-    Variable,
-    falling,
-    prioritized,
-    rising,
-    trapezoid,
-)
+from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable, falling, rising, trapezoid
+from fuzzy_arbiter.criteria import Criterion, prioritized
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.propositions import Is, Not, Or

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzy_arbiter import Arbiter, Criterion, Rule, Shape, Term, prioritized
+from fuzzy_arbiter import Arbiter, Rule, Shape, Term
+from fuzzy_arbiter.criteria import Criterion, prioritized
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.hierarchy import FORMS

@@ -5,7 +5,8 @@ import math
 
 import pytest
 
-from fuzzy_arbiter import Arbiter, Criterion, Output, System, Term, Variable, falling, rising
+from fuzzy_arbiter import Arbiter, Output, System, Term, Variable, falling, rising
+from fuzzy_arbiter.criteria import Criterion
 from fuzzy_arbiter.engines.firing import Firing
 
 SAMPLES = [(0.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.3, 0.6, 0.5), (0.5, 0.5, 0.5), (0.25, 1.0, 0.75)]
@@ -16,7 +17,7 @@ def lamp(rules, default=None, normalization="range", outputs=1):
     light = Variable("light", (0, 10), (Term("dark", falling(2, 4)), Term("bright", rising(6, 8))))
     low_high = (Term("low", falling(0, 1)), Term("high", rising(0, 1)))
     lamps = tuple(Output(f"lamp_{k + 1}", (0, 1), low_high, default) for k in range(outputs))
-    return Arbiter(system=System((light,), lamps, rules, normalization=normalization))
+    return Arbiter(System((light,), lamps, rules, normalization=normalization))
 
 
 def test_strengths_and_decisions_by_hand():
@@ -37,7 +38,7 @@ def test_strengths_and_decisions_by_hand():
     # alpha = smoothstep(h), and before normalizing (1 + alpha) / 3
     for output, h in zip(e.outputs, (0.3, 0.6, 0.4), strict=True):
         alpha = 3 * h**2 - 2 * h**3
-        assert output.weight == pytest.approx(alpha, abs=1e-15)
+        assert output.value == pytest.approx(alpha, abs=1e-15)
         assert output.centroid == pytest.approx((1 + alpha) / 3, abs=1e-15)
     assert (e.winner, e.runner_up) == ("shape", "depth")
     assert e.margin == pytest.approx(0.648 - 0.352)
@@ -48,7 +49,7 @@ def test_strengths_and_decisions_by_hand():
 def test_weights_are_those_of_the_arbiter(sample, engine):
     arbiter = Arbiter(engine=engine)
     e = arbiter.explain(sample)
-    assert e.weights == arbiter(sample)
+    assert e.result == arbiter(sample)
     assert [r.strength for r in e.rules] == Firing(arbiter.system).strengths(sample)
 
 
@@ -84,17 +85,15 @@ def test_strongest_rules_for_two_terms_decide(rules, light, strengths, decisions
     e = lamp(rules, outputs=len(decisions)).explain([light])
     assert [r.strength for r in e.rules] == strengths
     assert [(o.decided_by, o.runner_up, o.margin) for o in e.outputs] == decisions
-    if len(decisions) == 1:  # one output has no ranking
-        assert (e.winner, e.runner_up, e.margin) == (
-            ("lamp_1", None, e.weights[0]) if e.weights[0] else (None, None, 0.0)
-        )
-        assert "winner" not in str(e) and (" alone" in str(e)) == (decisions[0][1] is None)
+    assert (e.winner, e.runner_up, e.margin, e.tied) == (None, None, 0.0, ())  # outputs that are no criteria
+    if len(decisions) == 1:
+        assert (" alone" in str(e)) == (decisions[0][1] is None)
 
 
 def test_used_default_is_reported():
     arbiter = lamp((ON_DARK,), default=0.25, normalization="none")
     (output,) = arbiter.explain([5.0]).outputs
-    assert (output.centroid, output.weight, output.decided_by, output.margin) == (0.25, 0.25, None, 0.0)
+    assert (output.centroid, output.value, output.decided_by, output.margin) == (0.25, 0.25, None, 0.0)
     assert output.default_used and not arbiter.explain([1.0]).outputs[0].default_used
     assert "no rule fired: its default 0.25" in str(arbiter.explain([5.0]))
 
@@ -104,13 +103,12 @@ def test_output_without_a_firing_rule_is_reported_and_others_are_decided():
         [5.0]
     )
     first, second = e.outputs
-    assert math.isnan(first.weight) and math.isnan(first.centroid) and first.default_used and first.decided_by is None
-    assert (second.decided_by, e.winner, e.runner_up) == ("R3", "lamp_2", None)
+    assert math.isnan(first.value) and math.isnan(first.centroid) and first.default_used and first.decided_by is None
+    assert second.decided_by == "R3"
     assert "no rule fired, and no default" in str(e)
     data = json.loads(json.dumps(e.as_dict(), allow_nan=False))
-    assert data["outputs"][0]["weight"] is data["outputs"][0]["centroid"] is None
-    nothing = lamp((ON_DARK, ON_BRIGHT)).explain([5.0])
-    assert (nothing.winner, nothing.tied) == (None, ())
+    assert data["outputs"][0]["value"] is data["outputs"][0]["centroid"] is None
+    assert data.keys() == {"inputs", "rules", "outputs"}
 
 
 def test_text_lists_only_fired_rules():

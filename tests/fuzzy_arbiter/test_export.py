@@ -16,7 +16,6 @@ from benchmarks.fuzzy_accuracy import BOUND as ACCURACY
 from benchmarks.fuzzy_accuracy import Reference, random_cases, strengths_system
 from fuzzy_arbiter import (
     Arbiter,
-    Criterion,
     Output,
     Rule,
     Shape,
@@ -24,11 +23,11 @@ from fuzzy_arbiter import (
     Variable,
     auto_terms,
     falling,
-    prioritized,
     rising,
     trapezoid,
     triangle,
 )
+from fuzzy_arbiter.criteria import Criterion, prioritized
 from fuzzy_arbiter.definition import variable_names
 from fuzzy_arbiter.errors import EngineError, UnsupportedError
 from fuzzy_arbiter.export import to_c, to_python
@@ -244,7 +243,7 @@ def in_python(system, folder):
 
     def evaluate(x):
         try:
-            return 0, module["weights"](x)
+            return 0, module["values"](x)
         except ValueError as error:
             (status,) = {status for fault, status in faults.items() if fault in str(error)}
             return status, ()
@@ -255,7 +254,7 @@ def in_python(system, folder):
 def in_numba(system, folder):
     """The compiled arbiter, called from a compiled loop."""
     numba = pytest.importorskip("numba")
-    function = Arbiter(system=system).compiled()
+    function = Arbiter(system).compiled()
 
     @numba.njit
     def loop(rows, results):
@@ -283,7 +282,7 @@ CASES = [
 def test_exported_code_matches_the_arbiter(make, name, tmp_path):
     """Bit for bit, but for functions of which libraries differ; refused samples and undefined outputs by number."""
     system = {**SYSTEMS, **JOINED}[name]
-    evaluate, arbiter = make(system, tmp_path), Arbiter(system=system)
+    evaluate, arbiter = make(system, tmp_path), Arbiter(system)
     for x in samples(system).tolist():
         expected = tuple(arbiter(x))
         undefined = np.flatnonzero(np.isnan(expected))
@@ -316,7 +315,7 @@ def test_joined_terms_of_any_kind_match_the_engine(seed, tmp_path):
             results = [make(case.system, tmp_path / str(i))(list(case.cuts)) for make in makers]
         except UnsupportedError:
             continue
-        (expected,) = Arbiter(system=case.system)(list(case.cuts))
+        (expected,) = Arbiter(case.system)(list(case.cuts))
         low, high = case.output.universe
         assert results == [results[0]] * len(results), case
         for status, outputs in results:
@@ -356,7 +355,7 @@ def test_positions_of_all_maxima_count(implication, tmp_path):
             Rule(Is(v.name, "on"), tuple(Is(o.name, o.term_names[j]) for o in outputs)) for j, v in enumerate(inputs)
         )
         system = System(inputs, tuple(outputs), rules, implication=implication)
-        expected = tuple(Arbiter(system=system)(list(cuts)))
+        expected = tuple(Arbiter(system)(list(cuts)))
         (tmp_path / str(i)).mkdir()
         for make in (in_python, in_c):
             assert make(system, tmp_path / str(i))(cuts) == (0, pytest.approx(expected, abs=1e-7)), (terms, cuts)
@@ -387,9 +386,9 @@ def test_exported_code_returns_for_supports_between_its_nodes(implication, defuz
     module["height_1"] = counted
     for strengths in [(10.0**-k, other) for k in range(6, 14) for other in (0.0, 10.0**-k)]:
         calls.clear()
-        results.append((strengths, (0, module["weights"](strengths))))
+        results.append((strengths, (0, module["values"](strengths))))
         noise = 1e-15 / strengths[0]  # of degrees by rounding, as a fraction of the height
-        assert results[-1][1][1] == pytest.approx(Arbiter(system=system)(list(strengths)), abs=1e-8 + 100 * noise)
+        assert results[-1][1][1] == pytest.approx(Arbiter(system)(list(strengths)), abs=1e-8 + 100 * noise)
     evaluate = in_c(system, tmp_path)
     assert [(strengths, evaluate(strengths)) for strengths, _ in results] == results
 
@@ -399,7 +398,7 @@ def test_exported_code_returns_for_supports_between_its_nodes(implication, defuz
 def test_functions_take_any_number(make, tmp_path):
     """Of large and infinite numbers and of NaN, NumPy's value alone, in a batch and in exported code."""
     x = np.array([(*first, *second) for first in EXTREMES for second in EXTREMES])
-    evaluate, arbiter = make(ENDLESS, tmp_path), Arbiter(system=ENDLESS)
+    evaluate, arbiter = make(ENDLESS, tmp_path), Arbiter(ENDLESS)
     for row, expected in zip(x.tolist(), arbiter.batch(x).tolist(), strict=True):
         expected = pytest.approx(expected, rel=1e-11)
         assert tuple(arbiter(row)) == expected
@@ -417,9 +416,7 @@ def test_systems_of_several_files_go_into_one_program(tmp_path):
 
 def test_exported_python_module_has_no_dependencies(tmp_path):
     (tmp_path / "mine.py").write_text(to_python(WIDE))
-    code = (
-        "import sys; n = set(sys.modules); import mine; mine.weights([1.0, 0.5]); print(sorted(set(sys.modules) - n))"
-    )
+    code = "import sys; n = set(sys.modules); import mine; mine.values([1.0, 0.5]); print(sorted(set(sys.modules) - n))"
     done = subprocess.run([sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {code}"],
                           capture_output=True, text=True, check=True)  # fmt: skip
     assert done.stdout.strip() == "['__future__', 'mine']"

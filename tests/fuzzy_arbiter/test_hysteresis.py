@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import fuzzy_arbiter
-from fuzzy_arbiter import Arbiter, Criterion, Output, Shape, System, Variable, falling, propositions, rising
+from fuzzy_arbiter import Arbiter, Output, Shape, System, Variable, falling, propositions, rising
+from fuzzy_arbiter.criteria import Criterion
 from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.hysteresis import HysteresisArbiter
 
@@ -82,7 +83,7 @@ CROSSED = (falling(0, 1), rising(0, 1))
 def plain(rules, shapes=CROSSED):
     x = Variable("x", (0, 1), dict(zip(("off", "on", "more"), shapes, strict=False)))
     y = Output("y", (0, 1), {"low": falling(0, 1), "high": rising(0, 1)})
-    return Arbiter(system=System((x,), (y,), rules, normalization="range"))
+    return Arbiter(System((x,), (y,), rules, normalization="range"))
 
 
 def test_terms_can_be_given_explicitly_where_rules_do_not_determine_them():
@@ -203,7 +204,7 @@ def test_systems_without_criteria_are_rejected(shapes, match):
 
 def test_repr_round_trips():
     h = steady(dwell=0.5, graded=True)
-    names = {name: getattr(fuzzy_arbiter, name) for name in fuzzy_arbiter.__all__}
+    names = {name: getattr(fuzzy_arbiter, name) for name in fuzzy_arbiter.__all__} | vars(fuzzy_arbiter.criteria)
     assert repr(eval(repr(h), {**names, **vars(propositions)})) == repr(h)
 
 

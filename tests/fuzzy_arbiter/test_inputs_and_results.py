@@ -15,7 +15,6 @@ from fuzzy_arbiter import (
     Arbiter,
     ArbiterError,
     Constant,
-    Criterion,
     Formula,
     Linear,
     Operators,
@@ -27,10 +26,10 @@ from fuzzy_arbiter import (
     auto_terms,
     curve,
     falling,
-    prioritized,
     rising,
     triangle,
 )
+from fuzzy_arbiter.criteria import Criterion, prioritized
 from fuzzy_arbiter.errors import DefinitionError, FormatError, InputError
 from fuzzy_arbiter.formats import FORMATS, reads, writes
 
@@ -53,7 +52,7 @@ def pandas():
 
 @pytest.fixture
 def tipping():
-    return Arbiter(system=TIPPING)
+    return Arbiter(TIPPING)
 
 
 def test_systems_return_quantities_and_prioritized_criteria_return_shares(tipping):
@@ -99,7 +98,7 @@ def test_weights_go_by_the_names_of_the_criteria(tmp_path):
     assert weights["visibility"] == weights[3] == max(weights)
     explanation = arbiter.explain(sample)
     assert (explanation.winner, explanation.runner_up) == ("visibility", "depth")
-    assert explanation.weights["visibility"] == weights["visibility"]
+    assert explanation.result["visibility"] == weights["visibility"]
     assert (explanation.outputs[3].name, explanation.outputs[3].variable) == ("visibility", "alpha_4")
     assert "visibility (alpha_4)" in str(explanation)
     for suffix in FORMATS:
@@ -159,7 +158,7 @@ def test_keyword_columns_broadcast_scalars(tipping):
     assert [column.tolist() for column in weights] == [[0.0, 0.15625], [1.0, 0.84375], [0.0, 0.0]]
 
 
-@pytest.mark.parametrize("arbiter", [Arbiter(system=TIPPING), Arbiter([Criterion("service"), Criterion("food")])])
+@pytest.mark.parametrize("arbiter", [Arbiter(TIPPING), Arbiter([Criterion("service"), Criterion("food")])])
 @pytest.mark.parametrize(
     ("ask", "fault"),
     [
@@ -241,7 +240,7 @@ WINDY = System(
 
 @pytest.mark.parametrize("engine", ["exact", "skfuzzy"])
 def test_undefined_output_does_not_affect_others(engine):
-    arbiter = Arbiter(system=WINDY, engine=engine)
+    arbiter = Arbiter(WINDY, engine=engine)
     assert arbiter(wind=8.0) == pytest.approx((math.nan, 40.0, 200 / 3), nan_ok=True)
     rows = arbiter.batch(wind=[0.0, 8.0, 15.0])
     assert np.isnan(rows["sail"]).tolist() == [False, True, False] and rows["keel"][1] == 40.0
@@ -252,7 +251,7 @@ def test_undefined_output_does_not_affect_others(engine):
 
 @pytest.mark.parametrize(("normalization", "shares"), [("range", [0.2, 1]), ("sum", [1 / 6, 5 / 6]), ("max", [0.2, 1])])
 def test_undefined_output_has_no_share(normalization, shares):
-    shared = Arbiter(system=replace(WINDY, normalization=normalization))
+    shared = Arbiter(replace(WINDY, normalization=normalization))
     for weights in (shared(wind=8.0), shared.batch([[8.0]])[0]):
         assert math.isnan(weights[0]) and list(weights[1:]) == pytest.approx(shares)
 
@@ -298,7 +297,7 @@ def test_automatic_terms_accept_custom_names_and_reject_invalid_ones():
 def test_default_and_outside_can_be_overridden_when_loading(tmp_path):
     lamp = Output("lamp", (0, 10), {"on": rising(0, 10)})
     x = Variable("x", (0, 1), {"low": falling(0, 0.5)})
-    Arbiter(system=System((x,), (lamp,), ("if x is low then lamp is on",))).save(tmp_path / "a.fis")
+    Arbiter(System((x,), (lamp,), ("if x is low then lamp is on",))).save(tmp_path / "a.fis")
     path = tmp_path / "a.fis"
     assert math.isnan(Arbiter.load(path)(x=1.0)["lamp"])
     assert Arbiter.load(path, default=2)(x=1.0)["lamp"] == Arbiter.load(path, default={"lamp": 2})(x=1.0)["lamp"] == 2.0
@@ -337,7 +336,7 @@ def test_repr_of_a_system_round_trips_through_public_names(system):
     public = {name: getattr(fuzzy_arbiter, name) for name in fuzzy_arbiter.__all__}
     again = eval(repr(system), {"__builtins__": {}} | public)
     assert again == system and hash(again) == hash(system)
-    assert eval(repr(Arbiter(system=system)), {"__builtins__": {}} | public) == Arbiter(system=system)
+    assert eval(repr(Arbiter(system)), {"__builtins__": {}} | public) == Arbiter(system)
 
 
 def test_rounding_at_the_end_of_a_universe_is_no_fault(tipping):
@@ -365,7 +364,28 @@ def test_terms_take_arrays_and_results_are_numbers_where_there_is_one(tipping):
         float(Arbiter()([0, 0, 0]))
     with pytest.raises(InputError, match="got 2 values by position, expected one sample"):
         tipping(1, 2)
-    rows = tipping.batch(np.ma.masked_invalid([[np.nan, 1.0], [9.8, 6.5]])).filled(np.nan)
-    assert np.isnan(rows[0]).all() and rows[1, 0] == pytest.approx(tipping([9.8, 6.5])[0])
-    with pytest.raises(InputError, match=r"row 0: .* is nan, expected .* masked by numpy.ma.masked_invalid"):
-        tipping.batch([[np.nan, 1.0]])
+
+
+def test_rows_with_nan_give_nan_where_that_is_asked_for(tipping):
+    received = [[9.8, 6.5], [np.nan, 1.0], [3.0, None]]
+    rows = tipping.batch(received, nan_policy="propagate")
+    assert rows[:, 0].tolist() == pytest.approx([tipping([9.8, 6.5])[0], np.nan, np.nan], nan_ok=True)
+    columns = tipping.batch(service=[np.nan, 9.8], food=6.5, nan_policy="propagate")["tip"]
+    assert np.isnan(columns[0]) and columns[1] == rows[0, 0]
+    for policy, fault in (
+        ("raise", r"row 1: service is nan, expected .* or nan_policy='propagate'"),
+        ("omit", "nan_policy is 'omit'"),
+    ):
+        with pytest.raises(InputError, match=fault):
+            tipping.batch([[1.0, 1.0], [np.nan, 1.0]], nan_policy=policy)
+    with pytest.raises(InputError, match="row 1: service is inf"):
+        tipping.batch([[1.0, np.nan], [np.inf, 1.0]], nan_policy="propagate")
+    # rows without inputs do not count as those before
+    wind = Variable("wind", (0, 10), {"calm": falling(2, 4)})
+    sail = Output("sail", (0, 10), {"full": Linear((1.0,), 0.0)}, defuzzifier="average", lock_previous=True)
+    keeps = Arbiter(System([wind], [sail], ["if wind is calm then sail is full"]))
+    assert keeps.batch([[1.0], [np.nan], [9.0]], nan_policy="propagate")[:, 0].tolist() == pytest.approx(
+        [1.0, np.nan, 1.0], nan_ok=True
+    )
+    masked = keeps.batch(np.ma.masked_invalid([[1.0], [np.nan], [9.0]]))
+    assert masked[:, 0].tolist() == [1.0, None, 1.0]

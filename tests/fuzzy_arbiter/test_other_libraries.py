@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzy_arbiter import Arbiter, prioritized
+from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter.criteria import prioritized
 from fuzzy_arbiter.engines.scikit import ScikitEngine
 from tests.fuzzy_arbiter import reference
 from tests.fuzzy_arbiter.engines.test_scikit import TIP, TIPPING
@@ -33,7 +34,7 @@ def table(library, system):
 @pytest.mark.parametrize(("library", "system"), TABLES)
 def test_other_libraries_match_within_their_error(library, system):
     kept = table(library, system)
-    ours = Arbiter(system=SYSTEMS[system], engine="exact").batch(kept["inputs"])
+    ours = Arbiter(SYSTEMS[system], engine="exact").batch(kept["inputs"])
     low, high = SYSTEMS[system].outputs[0].universe
     errors = {}
     for resolution, theirs in kept["outputs"].items():
@@ -48,7 +49,7 @@ def test_other_libraries_match_within_their_error(library, system):
 def test_grid_engine_sums_as_simpful_does(system):
     kept = table("simpful", system)
     for resolution, theirs in kept["outputs"].items():
-        ours = Arbiter(system=replace(SYSTEMS[system], points=int(resolution)), engine="grid").batch(kept["inputs"])
+        ours = Arbiter(replace(SYSTEMS[system], points=int(resolution)), engine="grid").batch(kept["inputs"])
         assert ours == pytest.approx(np.array(theirs), abs=1e-12)
 
 
@@ -70,7 +71,7 @@ def test_the_tip_of_scikit_fuzzys_example():
     exact = Fraction(12118694, 610275)
     assert reference.centroid(TIP, [0, Fraction(1, 25), Fraction(24, 25)]) == exact
     rounding = 16 * np.finfo(float).eps  # moment over area, each the sum of a few parts above zero
-    assert Arbiter(system=TIPPING, engine="exact")([6.5, 9.8])[0] == pytest.approx(float(exact), rel=rounding)
+    assert Arbiter(TIPPING, engine="exact")([6.5, 9.8])[0] == pytest.approx(float(exact), rel=rounding)
     theirs = {points: ScikitEngine(replace(TIPPING, points=points)).centroids([6.5, 9.8])[0] for points in (26, 251)}
     assert theirs == pytest.approx({26: 19.847607, 251: 19.857694}, abs=5e-7)
 

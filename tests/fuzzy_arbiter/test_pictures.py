@@ -9,20 +9,22 @@ import pytest
 from matplotlib.figure import Figure
 
 from fuzzy_arbiter import (
-    SECTION_VI,
     Arbiter,
-    Criterion,
+    Constant,
+    Linear,
     Output,
     System,
     Term,
     Variable,
+    curve,
     falling,
     pictures,
     rising,
     trapezoid,
     triangle,
 )
-from fuzzy_arbiter.errors import DefinitionError, InputError, UnsupportedError
+from fuzzy_arbiter.criteria import SECTION_VI, Criterion
+from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.pictures.style import color, hatch, line_style, wrapped
 from tests.fuzzy_arbiter.formats.systems import RICHER
 
@@ -54,7 +56,7 @@ def arbiter():
 
 @pytest.fixture(scope="module")
 def sail():
-    return Arbiter(system=SAIL, engine="exact")
+    return Arbiter(SAIL, engine="exact")
 
 
 def drawn(ax):
@@ -82,8 +84,6 @@ def test_every_picture_draws_on_new_axes_or_on_those_given_and_changes_no_global
         assert isinstance(drawn(draw()).figure, Figure)
         ax = Figure().add_subplot()
         assert draw(ax) is ax
-    for ax in pictures.normalizations(arbiter, arbiter.system.inputs[0].name).values():
-        drawn(ax)
     import matplotlib.pyplot as plt
 
     assert plt.get_fignums() == []
@@ -123,7 +123,6 @@ INPUTS, OUTPUTS = (
         (lambda a: pictures.profile(a, "obstacle", {"speed": 1.0}), DefinitionError, INPUTS),
         (lambda a: pictures.surface(a, "alpha_1", ("obstacle", "speed")), DefinitionError, INPUTS),
         (lambda a: pictures.decisions(a, ("speed", "depth")), DefinitionError, INPUTS),
-        (lambda a: pictures.normalizations(a, "speed"), DefinitionError, INPUTS),
         (lambda a: pictures.rules(a, [0, 0, 0], "beta"), DefinitionError, OUTPUTS),
         (lambda a: pictures.surface(a, "beta", AXES), DefinitionError, OUTPUTS),
         (lambda a: pictures.decisions(a, ("obstacle", "obstacle")), DefinitionError, "appears twice"),
@@ -132,12 +131,7 @@ INPUTS, OUTPUTS = (
         (lambda a: pictures.profile(a, "obstacle", {"depth": 2.0}), InputError, r"depth: input is 2\.0"),
         (lambda a: pictures.terms(a, "obstacle", at=2.0), InputError, r"obstacle: position is 2\.0"),
         (
-            lambda a: pictures.normalizations(a, "obstacle", axes={"softmax": None}),
-            DefinitionError,
-            "no normalization 'so",
-        ),
-        (
-            lambda a: pictures.decisions(Arbiter(system=LONE), ("wind", "waves")),
+            lambda a: pictures.decisions(Arbiter(LONE), ("wind", "waves")),
             DefinitionError,
             "two or more to decide",
         ),
@@ -164,11 +158,8 @@ def test_a_legend_is_no_wider_than_its_axes(arbiter):
     levels = Variable("level", (0, 7), tuple(Term(f"step number {i}", triangle(i - 1, i, i + 1)) for i in range(8)))
     many = replace(SAIL, inputs=(levels, *SAIL.inputs[1:]), rules=("if waves is low then sail is full",))
     ax = Figure(figsize=(10.0, 6.0)).add_subplot(2, 3, 1)
-    legend = drawn(pictures.terms(Arbiter(system=many, engine="exact"), "level", ax=ax)).get_legend()
+    legend = drawn(pictures.terms(Arbiter(many, engine="exact"), "level", ax=ax)).get_legend()
     assert legend.get_window_extent().width < 1.1 * ax.bbox.width
-    axes = Figure(figsize=(8.0, 6.0)).subplots(2, 1)
-    pictures.normalizations(arbiter, "obstacle", axes=dict(zip(("range", "sum"), axes, strict=True)))
-    assert [ax.get_legend() is not None for ax in axes] == [True, False] and not axes[0].figure.legends
     texts = wrapped("the first = 1, the second = 2, the third = 3", 16).split("\n")
     assert not any(text.startswith("=") or text.endswith("=") for text in texts)
 
@@ -177,19 +168,10 @@ def test_a_profile_has_a_gap_where_an_output_is_undefined_and_jumps_to_a_default
     x, y = pictures.profile(sail, "wind", {"waves": 0.5}).get_lines()[0].get_data()
     assert np.isnan(y[x > 12.0]).all() and np.isfinite(y[x < 12.0]).all()
     outputs = tuple(replace(output, default=0.0) for output in SAIL.outputs)
-    raw = Arbiter(system=replace(SAIL, outputs=outputs, normalization="none"))
+    raw = Arbiter(replace(SAIL, outputs=outputs, normalization="none"))
     x, y = pictures.profile(raw, "wind", {"waves": 0.5}).get_lines()[0].get_data()
     (jump,) = np.flatnonzero(np.abs(np.diff(y)) > 10.0)[-1:]
     assert x[jump + 1] - x[jump] < 1e-6 and x[jump] == pytest.approx(12.0)
-
-
-def test_each_normalization_is_that_of_the_system(arbiter):
-    at = {"shape": 0.8, "depth": 0.3}
-    for name, ax in pictures.normalizations(arbiter, "obstacle", at).items():
-        other = Arbiter(normalization=name, engine="exact")
-        for k, line in enumerate(ax.get_lines()):
-            for x, y in line.get_xydata()[::53]:
-                assert y == pytest.approx(other({"obstacle": x} | at)[k], abs=1e-12)
 
 
 def texts(ax):
@@ -221,7 +203,7 @@ def test_rules_picture_reports_that_no_rule_fires(sail):
     said = texts(pictures.rules(sail, [15.0, 0.5], "sail"))
     assert any(text.endswith("sail: no rule fires") for text in said)
     with_default = replace(SAIL, outputs=(replace(SAIL.outputs[0], default=72.0), SAIL.outputs[1]))
-    other = Arbiter(system=with_default, engine="exact")
+    other = Arbiter(with_default, engine="exact")
     said = texts(pictures.rules(other, [15.0, 0.5], "sail"))
     weight = other([15.0, 0.5])["sail"]
     assert "default 72" in said and any(text.endswith(f"sail = {weight:.4g}") for text in said)
@@ -242,7 +224,7 @@ def test_flat_surface_is_labeled_with_text(arbiter, sail):
     assert "alpha_3 = 0 everywhere" in texts(ax)
     narrow = replace(SAIL, rules=("if wind is calm and not wind is calm then sail is full and keel is up",))
     crisp = replace(narrow, inputs=(replace(SAIL.inputs[0], universe=(10, 20)), SAIL.inputs[1]))
-    ax = pictures.surface(Arbiter(system=crisp, engine="exact"), "sail", ("wind", "waves"), points=11)
+    ax = pictures.surface(Arbiter(crisp, engine="exact"), "sail", ("wind", "waves"), points=11)
     assert "undefined everywhere" in texts(ax)
 
 
@@ -270,21 +252,42 @@ def test_a_decision_is_that_of_the_greatest_weight(arbiter):
     assert len(points) > 50 and (weights[:, 2] - weights[:, 1]).max() < 0.01
 
 
-def test_curves_are_drawn_and_values_are_refused():
+def test_curves_and_values_are_drawn():
     system = RICHER["fll"]
-    arbiter = Arbiter(system=system)
+    arbiter = Arbiter(system)
     for name in ("quality", "mood"):
         ax = pictures.terms(arbiter, name)
         variable = next(v for v in (*system.inputs, *system.outputs) if v.name == name)
         for line, term in zip(ax.get_lines(), variable.terms, strict=True):
             x, y = line.get_data()
             assert y == pytest.approx(term.shape.of_many(np.asarray(x)), abs=1e-12)
-    with pytest.raises(UnsupportedError, match="terms of 'tip': it has values or none, which are not drawn"):
-        pictures.terms(arbiter, "tip")
-    with pytest.raises(UnsupportedError, match="rules of 'tip': its values, or terms under"):
-        pictures.rules(arbiter, [5.0, 5.0], "tip")
-    with pytest.raises(UnsupportedError, match=r"rules of 'mood': .* joined by probor, are not drawn"):
-        pictures.rules(arbiter, [5.0, 5.0], "mood")
+
+
+def test_values_are_drawn_as_stems_or_by_their_range_and_rules_of_any_join():
+    wind = Variable("wind", (0, 20), {"calm": falling(4, 8), "strong": rising(4, 8)})
+    terms = {"full": Constant(12.0), "reefed": Linear((-0.25,), 8.0)}
+    outputs = (
+        Output("sail", (0, 10), terms, defuzzifier="average"),
+        Output("heel", (0, 9), {"up": rising(0, 9)}, None, "sum"),
+    )
+    rules = ("if wind is calm then sail is full and heel is up", "if wind is strong then sail is reefed")
+    arbiter = Arbiter(System((wind,), outputs, rules))
+    stem, span, ramp = (
+        line.get_xdata() for name in ("sail", "heel") for line in pictures.terms(arbiter, name).get_lines()
+    )
+    assert set(stem) == {12.0} and (min(span), max(span)) == (3.0, 8.0) and set(ramp) == {0.0, 9.0}
+    ax = pictures.rules(arbiter, [6.0], "sail")
+    stems = [line.get_xdata() for line in ax.get_lines() if len(set(line.get_xdata())) == 1]
+    assert {12.0, 6.5, arbiter([6.0])[0]} <= {x for line in stems for x in line}
+    assert "average 9.25" in texts(ax) and ax.get_xlim() == (0.0, 12.0)
+    for name, implication in (("probor", "einstein_product"), ("sum", "prod"), ("bounded_sum", "min")):
+        tip = Output("tip", (0, 25), {"low": curve("gaussian", 8, 4), "high": triangle(5, 20, 25)}, aggregation=name)
+        ruled = ("if wind is calm then tip is low", "if wind is any then tip is high with 0.5")
+        arbiter = Arbiter(System((wind,), (tip,), ruled, implication=implication))
+        ax = pictures.rules(arbiter, [6.0])
+        (joined,) = (line.get_xydata() for line in ax.get_lines() if line.get_linewidth() == 1.8)
+        x, heights = joined[:, 0], joined[:, 1].max() - joined[:, 1]
+        assert (x * heights).sum() / heights.sum() == pytest.approx(arbiter([6.0])[0], abs=0.1)
 
 
 def test_former_spellings_warn_and_work():
@@ -292,5 +295,7 @@ def test_former_spellings_warn_and_work():
 
     with pytest.warns(DeprecationWarning, match="COLOURS is now COLORS"):
         assert fuzzy_arbiter.pictures.COLOURS is fuzzy_arbiter.pictures.COLORS
-    with pytest.warns(DeprecationWarning, match="prioritised is now prioritized"):
-        assert fuzzy_arbiter.prioritised is fuzzy_arbiter.prioritized
+    for name in ("prioritised", "prioritized", "Criterion", "SECTION_VI", "HysteresisArbiter", "ramp"):
+        new = name.replace("ised", "ized")
+        with pytest.warns(DeprecationWarning, match=f"fuzzy_arbiter.{name} is now fuzzy_arbiter.criteria.{new}"):
+            assert getattr(fuzzy_arbiter, name) is getattr(fuzzy_arbiter.criteria, new)

@@ -9,21 +9,8 @@ from functools import partial
 
 import pytest
 
-from fuzzy_arbiter import (
-    Arbiter,
-    Criterion,
-    Output,
-    Rule,
-    Shape,
-    System,
-    Term,
-    Variable,
-    falling,
-    prioritized,
-    rising,
-    trapezoid,
-    triangle,
-)
+from fuzzy_arbiter import Arbiter, Output, Rule, Shape, System, Term, Variable, falling, rising, trapezoid, triangle
+from fuzzy_arbiter.criteria import Criterion, prioritized
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.verification import verify as verify_system
@@ -108,7 +95,7 @@ def test_a_gap_is_a_fault_unless_there_is_a_default():
     fault = v.findings[0]
     assert fault.severity == "fault"
     assert fault.text == "output 'alpha_1': no rule fires where obstacle = 0.25; it has no default"
-    assert math.isnan(Arbiter(system=s)([fault.place["obstacle"], 0.0, 0.0])["obstacle"])
+    assert math.isnan(Arbiter(s)([fault.place["obstacle"], 0.0, 0.0])["obstacle"])
     assert "input 'obstacle': in [0.25, 0.5] no term has a degree above 0" in texts(v, "warning")
     assert "input 'obstacle': in (0, 1) the degrees sum to less than 1: 0 to 1" in texts(v, "note")
     v = verify(System((pair("a"),), (output("y", 0.5),), ("if a is on then y is high",)))
@@ -122,13 +109,13 @@ def test_overlapping_rules_are_ok_but_of_criteria(defuzzifier):
     rules = ["if a is on then y is high", "if b is on then y is low", "if a is off then y is low"]
     made = system(rules)
     made = replace(made, outputs=(replace(made.outputs[0], defuzzifier=defuzzifier, aggregation=""),))
-    v = Arbiter(system=made).verify()
+    v = Arbiter(made).verify()
     assert (v.ok, v.complete, v.graded_complete, v.consistent, v.exclusive) == (True, True, True, None, None)
     assert not re.search("contradict|exclusive|consistent|winner|criteri", str(v))
-    short = Arbiter(system=replace(made, rules=made.rules[:2])).verify()
+    short = Arbiter(replace(made, rules=made.rules[:2])).verify()
     assert (short.ok, short.complete, short.graded_complete) == (False, False, False)
     if defuzzifier == "centroid":
-        assert Arbiter(system=made).verify(as_criteria=True).consistent is False
+        assert Arbiter(made).verify(as_criteria=True).consistent is False
 
 
 # sizes and forms
@@ -198,7 +185,7 @@ def test_two_high_outputs_violate_exclusivity(weight, exclusive):
     if not exclusive:
         assert "two outputs are high where a is on, b is on: y is high by R1, z is high by R4" in texts(v, "warning")
         (graded,) = [f for f in v.findings if f.about == "graded_exclusive"]
-        assert min(Arbiter(system=system(rules, outputs="yz"))([graded.place["a"], graded.place["b"]])) > 0.3
+        assert min(Arbiter(system(rules, outputs="yz"))([graded.place["a"], graded.place["b"]])) > 0.3
 
 
 def test_greatest_term_is_identified_by_its_centroid():
@@ -332,7 +319,7 @@ def test_tiny_degrees_are_not_lost_in_complements(order):
     terms = (Term("seldom", Shape(((0, 1e-20), (1, 1)))), Term("often", falling(0, 1)))[::order]
 
     def graded(rule):
-        arbiter = Arbiter(system=System((Variable("x", (0, 1), terms),), (output("y"),), (rule,)))
+        arbiter = Arbiter(System((Variable("x", (0, 1), terms),), (output("y"),), (rule,)))
         return arbiter, arbiter.verify().graded_complete
 
     assert graded("if x is seldom then y is high")[1] is True
@@ -369,4 +356,4 @@ def test_a_variable_of_very_many_terms_is_not_verified():
     x, y = Variable("x", (0.0, 999.0), terms), Output("y", (0.0, 999.0), terms)
     made = System((x,), (y,), tuple(f"if x is t{j} then y is t{j}" for j in range(1000)))
     with pytest.raises(UnsupportedError, match="verify: 'x' has 1000 terms, expected at most 200"):
-        Arbiter(system=made).verify()
+        Arbiter(made).verify()

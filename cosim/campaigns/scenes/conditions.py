@@ -49,7 +49,7 @@ class Conditions(Table, frozen=True):
             raise ScenarioError(f"--arbiter is {arbiter!r}, expected {known}, or a file of rules")
         setup = read_rules(ArbiterSetup(file=arbiter))
         try:
-            engine = Arbiter(system=reads(setup.text, Path(setup.file).suffix.lower().removeprefix("."))).engine
+            engine = Arbiter(reads(setup.text, Path(setup.file).suffix.lower().removeprefix("."))).engine
         except ArbiterError as error:
             raise ScenarioError(f"--arbiter: {arbiter}: {error}") from error
         return cls(arbiter_file=setup.file, arbiter_text=setup.text, arbiter_engine=engine, **others)  # type: ignore[arg-type]

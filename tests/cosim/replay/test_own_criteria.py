@@ -89,7 +89,7 @@ def test_rules_of_an_arbiter_file_match_its_explanation(ruled):
     viewing = ViewColumns(ruled.scenario, ruled.record.columns)
     names = [column.name for column in viewing.columns]
     rows = viewing.compute_rows(ruled.record.stack([ruled.record.columns[i].name for i in viewing.picked]))
-    arbiter = Arbiter(system=ruled.scenario.rules.system)
+    arbiter = Arbiter(ruled.scenario.rules.system)
     inputs = [names.index(f"arbiter.{signal.name}") for signal in ruled.scenario.rules.inputs]
     fired = [names.index(f"rule.R{i}") for i in range(1, 5)]
     for row in rows[::40]:

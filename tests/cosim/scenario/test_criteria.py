@@ -6,7 +6,8 @@ import pytest
 
 from cosim.errors import ScenarioError
 from cosim.scenario.scenario import load_scenario
-from fuzzy_arbiter import Arbiter, Criterion, falling, prioritized
+from fuzzy_arbiter import Arbiter, falling
+from fuzzy_arbiter.criteria import Criterion, prioritized
 from fuzzy_arbiter.formats import save
 
 FOUR = "inspection-visibility"
@@ -77,7 +78,7 @@ def test_four_criteria_are_weighted_by_the_rules_of_section_vi():
     system = load_scenario(FOUR).rules.system
     arbiter = Arbiter([Criterion(name) for name in "abcd"])
     for sample in ([1, 1, 1, 1], [0, 0, 0, 1], [0.2, 0.5, 0.1, 0.9], [0, 0.7, 1, 0.4]):
-        assert Arbiter(system=system)(sample) == arbiter(sample)
+        assert Arbiter(system)(sample) == arbiter(sample)
 
 
 def test_criteria_order_sets_priority_and_column_order():
@@ -141,7 +142,7 @@ def test_a_file_of_saved_criteria_has_weights_by_their_names(own, suffix):
     saved.save(path)
     inputs = '{ depth = "membership.depth", obstacle = "membership.obstacle" }'
     loaded = load_scenario(own, [f"arbiter.file={path}", f"arbiter.inputs={inputs}"])
-    weights = Arbiter(system=loaded.rules.system)([0.25, 1.0])
+    weights = Arbiter(loaded.rules.system)([0.25, 1.0])
     assert weights._fields == ("obstacle", "depth")
     assert weights._asdict() == pytest.approx(saved([0.25, 1.0])._asdict(), abs=1e-12)
 
@@ -155,7 +156,7 @@ def test_every_format_is_read(own, suffix):
     said = ", ".join(f"{key} = {value!r}" for key, value in inputs.items()).replace("'", '"')
     loaded = load_scenario(own, [f"arbiter.file={path}", f"arbiter.inputs={{{said}}}"])
     for sample in ([0.3, 2.0, 0.4, 0.7], [4.0, 9.0, 0.1, 1.0]):
-        assert Arbiter(system=loaded.rules.system)(sample) == pytest.approx(Arbiter(system=system)(sample), abs=1e-12)
+        assert Arbiter(loaded.rules.system)(sample) == pytest.approx(Arbiter(system)(sample), abs=1e-12)
 
 
 @pytest.mark.parametrize(

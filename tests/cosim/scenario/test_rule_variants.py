@@ -9,7 +9,8 @@ from cosim.errors import ScenarioError
 from cosim.scenario.arbiter_rules import rules_by_order
 from cosim.scenario.criteria import PAPER, CriterionSetup, Reason
 from cosim.scenario.scenario import load_scenario
-from fuzzy_arbiter import SECTION_VI, Arbiter, prioritized
+from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter.criteria import SECTION_VI, prioritized
 
 FOUR = (*PAPER, CriterionSetup("visibility", "#CC79A7", (Reason("ramp", None),)))
 PLACES = (0.0, 0.2, 0.4, 0.6, 1.0)
@@ -19,12 +20,12 @@ def weights(variant, criteria, memberships):
     """Return the weights by the criteria's names, of memberships by their places."""
     system = rules_by_order(variant, criteria, 101)
     by_name = dict(zip((criterion.name for criterion in criteria), memberships, strict=True))
-    return Arbiter(system=system)([by_name[variable.name] for variable in system.inputs])
+    return Arbiter(system)([by_name[variable.name] for variable in system.inputs])
 
 
 @pytest.mark.medium
 def test_reversed_rules_are_those_of_the_reversed_order():
-    last_first = Arbiter(system=prioritized(SECTION_VI[::-1]))
+    last_first = Arbiter(prioritized(SECTION_VI[::-1]))
     for memberships in itertools.product(PLACES, repeat=3):
         found = weights("reversed", PAPER, memberships)
         assert found._fields == ("obstacle", "shape", "depth")
@@ -43,16 +44,16 @@ def test_crisp_rules_are_the_fuzzy_ones_of_rounded_memberships():
 def test_without_an_arbiter_all_weights_are_1():
     scenario = load_scenario("inspection-visibility", ['arbiter.rules="none"'])
     inputs = [signal.course[0][1] for signal in scenario.rules.inputs]
-    assert list(Arbiter(system=scenario.rules.system)(inputs)) == pytest.approx([1.0] * 4, abs=1e-12)
+    assert list(Arbiter(scenario.rules.system)(inputs)) == pytest.approx([1.0] * 4, abs=1e-12)
 
 
 @pytest.mark.parametrize("variant", ["ordered", "reversed", "crisp", "none"])
 def test_rule_variants_use_the_closed_form_engine(variant):
-    assert Arbiter(system=rules_by_order(variant, FOUR, 101)).engine == "closed"
+    assert Arbiter(rules_by_order(variant, FOUR, 101)).engine == "closed"
 
 
 def test_rule_variant_is_rejected_with_an_arbiter_file(tmp_path):
-    Arbiter(system=prioritized()).save(tmp_path / "mine.json")
+    Arbiter(prioritized()).save(tmp_path / "mine.json")
     table = "".join(f'arbiter.inputs.{name}="membership.{name}"\n' for name in ("obstacle", "shape", "depth"))
     changes = [f'arbiter.file="{tmp_path / "mine.json"}"', *table.splitlines()]
     assert load_scenario("docking", changes).arbiter.rules == "ordered"

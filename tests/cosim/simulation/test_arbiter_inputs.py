@@ -12,7 +12,8 @@ from cosim.scenario.arbiter_rules import ArbiterRules, InputSignal
 from cosim.scenario.criteria import PAPER
 from cosim.scenario.region_tables import SecondaryRegion
 from cosim.step.arbiter_inputs import compute_inputs, empty_signals, empty_state, pack_inputs, write_arbiter_state
-from fuzzy_arbiter import Criterion, prioritized, rising
+from fuzzy_arbiter import rising
+from fuzzy_arbiter.criteria import Criterion, prioritized
 
 GOAL = Region("goal", Sphere((5.0, 0.0, 2.0), 1.0), "in", velocity=(0.1, 0.0, 0.0))
 REGIONS = [

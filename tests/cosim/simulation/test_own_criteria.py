@@ -12,7 +12,8 @@ from cosim.results.record import load_record
 from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
-from fuzzy_arbiter import Arbiter, Criterion
+from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter.criteria import Criterion
 from fuzzy_arbiter.formats import load
 from tests.cosim.batch.test_fused import assert_same_signals
 from tests.cosim.scenario.test_criteria import RULES, SCENARIO
@@ -152,7 +153,7 @@ def test_record_holds_the_arbiter_inputs(own, tmp_path):
     )
     record = load_record(run_scenario(scenario, tmp_path / "run", report=False).folder)
     inputs = [record[f"arbiter.{name}"] for name in ("distance", "soon", "charge", "depth_asks")]
-    arbiter = Arbiter(system=load(own.parent / "mine.toml"))
+    arbiter = Arbiter(load(own.parent / "mine.toml"))
     names = [output.name for output in arbiter.system.outputs]
     for k in range(0, len(record), 20):
         weights = dict(zip(names, arbiter(np.clip([x[k] for x in inputs], 0.0, [5, 10, 1, 1]).tolist()), strict=True))

@@ -7,7 +7,8 @@ from controller.regions import pack
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.start_values import start_values
 from cosim.ssp.system import MOTION, WRENCH
-from fuzzy_arbiter import Arbiter, ramp
+from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter.criteria import ramp
 from plant_fmu import Plant
 
 

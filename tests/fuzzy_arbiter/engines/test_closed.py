@@ -9,20 +9,8 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import (
-    Arbiter,
-    Criterion,
-    Output,
-    Rule,
-    Shape,
-    System,
-    Term,
-    Variable,
-    falling,
-    prioritized,
-    rising,
-    triangle,
-)
+from fuzzy_arbiter import Arbiter, Output, Rule, Shape, System, Term, Variable, falling, rising, triangle
+from fuzzy_arbiter.criteria import Criterion, prioritized
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.rational_pieces import pieces
 from fuzzy_arbiter.errors import EngineError
@@ -82,7 +70,7 @@ def test_weights_of_any_pair_are_rational(low, high, h, normalization):
         expected, tolerance = expected / whole, 1e-11
         alone = Arbiter(criteria(1), weight=output)
         assert {alone([0.0]), alone([1.0])} == {(0.0,), (1.0,)}
-    arbiter = Arbiter(system=system, engine="closed")
+    arbiter = Arbiter(system, engine="closed")
     assert all(0.0 <= w <= 1.0 for w in arbiter(inputs))
     assert arbiter(inputs) == pytest.approx(expected, abs=tolerance)
     assert arbiter.batch([inputs])[0] == pytest.approx(expected, abs=tolerance)
@@ -196,7 +184,7 @@ ROOM = [Criterion("wall", membership=falling(0.0, 0.5)), Criterion("temperature"
     ],
 )
 def test_whatever_is_cut_at_h_and_1_minus_h_has_a_closed_form(made):
-    arbiter, exact = Arbiter(system=made), Arbiter(system=made, engine="exact")
+    arbiter, exact = Arbiter(made), Arbiter(made, engine="exact")
     assert arbiter.engine == "closed"
     rows = np.random.default_rng(2).uniform(*np.array([v.universe for v in made.inputs]).T, (50, len(made.inputs)))
     assert np.abs(arbiter.batch(rows) - exact.batch(rows)).max() <= 16 * EPS
@@ -219,8 +207,8 @@ NEARLY = (Term("on", Shape(((0, 1e-20), (1, 1)))), Term("off", falling(0, 1)))  
 def test_missing_closed_form_is_explained(terms, rules, words):
     made = system(rules, "a", terms, outputs=LOW_HIGH[:1])
     with pytest.raises(EngineError, match=words):
-        Arbiter(system=made, engine="closed")
-    automatic = Arbiter(system=made)
+        Arbiter(made, engine="closed")
+    automatic = Arbiter(made)
     assert (automatic.engine, words in automatic.engine_reason) == ("exact", True)
 
 
@@ -228,7 +216,7 @@ def test_missing_closed_form_is_explained(terms, rules, words):
 @settings(max_examples=examples(80), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(systems(norms=False), st.data())
 def test_closed_form_matches_exact_centroid_for_any_system(system, data):
-    arbiter = Arbiter(system=system)
+    arbiter = Arbiter(system)
     inputs = [data.draw(st.floats(0.0, 1.0)) for _ in system.inputs]
     if arbiter.engine == "closed":
         exact = [float(c) for c in reference.centroids(system, inputs)]
@@ -274,5 +262,5 @@ def test_closed_form_search_is_bounded():
         return Or(tuple(both[:400]))
 
     rules = (Rule(And((pairs(names[:30]), pairs(names[30:]))), Y["high"]), Rule(Is("v0", "on"), Y["low"]))
-    arbiter = Arbiter(system=System(variables, (Y,), rules))  # at once, or the limit on the time of a test ends it
+    arbiter = Arbiter(System(variables, (Y,), rules))  # at once, or the limit on the time of a test ends it
     assert "more than 512 clauses" in arbiter.engine_reason

@@ -36,7 +36,7 @@ EPS = np.finfo(float).eps
 def test_centroid_is_exact_for_any_system(system, data):
     inputs = [data.draw(st.floats(0.0, 1.0)) for _ in system.inputs]
     exact = reference.centroids(system, inputs)
-    arbiter = Arbiter(system=system, engine="exact")
+    arbiter = Arbiter(system, engine="exact")
     expected = [math.nan if c is None else float(c) for c in exact]
     assert arbiter(inputs) == pytest.approx(expected, abs=8 * EPS, nan_ok=True)
     assert np.array_equal(arbiter.batch([inputs])[0], arbiter(inputs), equal_nan=True)
@@ -66,7 +66,7 @@ TINY = (5e-324, 1e-310, 1e-200, 1e-121, 1e-119, 1e-60, 1e-30, 1e-17, 1e-12, 1e-9
     ],
 )
 def test_centroids_that_are_known(implication, terms, concluded, universe, strengths, value):
-    arbiter = Arbiter(system=system(terms, *concluded, universe=universe, implication=implication))
+    arbiter = Arbiter(system(terms, *concluded, universe=universe, implication=implication))
     assert arbiter.engine == "exact"
     for strength in strengths:
         assert arbiter([strength]) == pytest.approx([value], abs=4 * EPS)
@@ -91,7 +91,7 @@ def test_cuts_of_any_size_are_exact(terms, data, scaled):
 
 def test_output_with_one_centroid_cannot_be_normalized():
     with pytest.raises(EngineError, match=r"output 'y': its terms have one centroid, 0\.5"):
-        Arbiter(system=system({"any": triangle(0, 0.5, 1)}, "any", normalization="range"))
+        Arbiter(system({"any": triangle(0, 0.5, 1)}, "any", normalization="range"))
 
 
 PAIR = {"a": falling(0, 5), "b": rising(5, 10)}
@@ -109,7 +109,7 @@ PAIR = {"a": falling(0, 5), "b": rising(5, 10)}
 )
 def test_the_default_counts_where_no_rule_fires(normalization, default, weight):
     made = system(PAIR, "b", start=0.5, universe=(0, 10), default=default, normalization=normalization)
-    arbiter = Arbiter(system=made)
+    arbiter = Arbiter(made)
     assert arbiter([0.25]) == pytest.approx((weight,), nan_ok=True)
     assert arbiter.batch([[0.1], [0.25], [0.75]])[:2, 0] == pytest.approx([weight] * 2, nan_ok=True)
     assert not np.isnan(arbiter.batch([[0.1], [0.75]])[1, 0])
@@ -150,4 +150,4 @@ def test_a_rule_without_value_leaves_other_outputs_alone(engine):
     rules = ("if x is odd then z is a", "if x is ~odd then z is a", "if x is on then y is a")
     system = System((x,), (Output("z", (0, 1), y.terms[:1]), y), rules, normalization="none")
     assert str(system.rules[1]) == "if x is not odd then z is a"
-    assert Arbiter(system=system, engine=engine).batch([[0.1234567]])[0, 1] == pytest.approx(0.5)
+    assert Arbiter(system, engine=engine).batch([[0.1234567]])[0, 1] == pytest.approx(0.5)

@@ -12,7 +12,7 @@ def arbiter(points=11, defuzzifier="centroid", implication="min", **terms):
     inputs = [Variable(name, (0, 1), {"on": rising(0, 1)}) for name in terms]
     rules = [f"if {name} is on then y is {name}" for name in terms]
     output = Output("y", (0, 10), terms, defuzzifier=defuzzifier)
-    return Arbiter(system=System(inputs, [output], rules, points=points, implication=implication), engine="grid")
+    return Arbiter(System(inputs, [output], rules, points=points, implication=implication), engine="grid")
 
 
 @pytest.mark.parametrize(

@@ -219,7 +219,7 @@ def test_every_defuzzifier_is_the_limit_of_dense_sampling(defuzzifier, implicati
         return
     made = strengths_system(output, implication)
     assert ExactEngine(made).centroids(cuts)[0] == pytest.approx(expected, abs=off)
-    grid = Arbiter(system=replace(made, points=4001), engine="grid")
+    grid = Arbiter(replace(made, points=4001), engine="grid")
     assert grid(cuts)[0] == pytest.approx(expected, abs=max(off, 6e-3))
     assert grid.batch([cuts, cuts]) == pytest.approx(np.array([grid(cuts)] * 2), abs=1e-12)
 
@@ -307,11 +307,9 @@ def test_unintegrable_terms_are_rejected():
 
 def test_arbiter_names_the_evaluation_method_of_each_output():
     made = strengths_system(Output("y", (0, 10), TERMS), "min")
-    assert Arbiter(system=made).engine_reason.endswith(
-        "'y': integrals of polynomials, within 1e-09 of the universe's width"
-    )
+    assert Arbiter(made).engine_reason.endswith("'y': integrals of polynomials, within 1e-09 of the universe's width")
     formula = Output("y", (0, 10), {"a": Formula("max(0, 1 - abs(x - 3.001) * 50)"), "b": triangle(4, 5, 6)})
-    assert "without a bound" in Arbiter(system=strengths_system(formula, "min")).engine_reason
+    assert "without a bound" in Arbiter(strengths_system(formula, "min")).engine_reason
     straight = strengths_system(Output("y", (0, 10), TERMS[3:]), "min")
-    assert Arbiter(system=straight).engine_reason.startswith("there is no closed form: ")
-    assert "quadrature" not in Arbiter(system=straight).engine_reason
+    assert Arbiter(straight).engine_reason.startswith("there is no closed form: ")
+    assert "quadrature" not in Arbiter(straight).engine_reason

@@ -10,18 +10,8 @@ import numpy as np
 import pytest
 from skfuzzy import control
 
-from fuzzy_arbiter import (
-    Output,
-    Rule,
-    Shape,
-    System,
-    Variable,
-    falling,
-    prioritized,
-    rising,
-    trapezoid,
-    triangle,
-)
+from fuzzy_arbiter import Output, Rule, Shape, System, Variable, falling, rising, trapezoid, triangle
+from fuzzy_arbiter.criteria import prioritized
 from fuzzy_arbiter.engines.scikit import ScikitEngine
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Not, Or

@@ -30,7 +30,7 @@ def test_jfuzzylogic_functions_and_defaults_are_read():
     assert high.expression(("x", "z"))({"x": 10.0, "z": 0.0}) == pytest.approx(1.0 + 100 % 4)
     # singletons and functions by COGS; of two rules for one the greater counts, for ACCU is MAX
     assert (system.outputs[0].defuzzifier, system.outputs[0].aggregation) == ("average", "max")
-    assert Arbiter(system=system)([3.0, 0.25]) == pytest.approx((0.25 * 5 + 0.75 * 7.125,))
+    assert Arbiter(system)([3.0, 0.25]) == pytest.approx((0.25 * 5 + 0.75 * 7.125,))
 
 
 FUZZYLITE = FOREIGN["fuzzylite.fcl"]
@@ -75,7 +75,7 @@ def test_matlab_functions_are_read():
     assert c(0.0) == pytest.approx(2 / 3)  # of which rise and fall cross
     assert (d(1.0), d(0.9), e(0.25)) == (1.0, 0.0, 0.75)
     assert f(0.5) == pytest.approx(1 / (1 + math.exp(-1)) / (1 + math.exp(-2.5)))
-    assert Arbiter(system=system)([1.0, 0.5]) == pytest.approx((1.0 + 2 * 0.5 + 3,))
+    assert Arbiter(system)([1.0, 0.5]) == pytest.approx((1.0 + 2 * 0.5 + 3,))
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import Arbiter, Output, Term, Variable, falling, prioritized, rising, triangle
+from fuzzy_arbiter import Arbiter, Output, Term, Variable, falling, rising, triangle
+from fuzzy_arbiter.criteria import prioritized
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.rule import Operators
@@ -149,9 +150,9 @@ def test_one_of_several_blocks_is_chosen_by_name(tmp_path):
 
 
 def test_strengths_are_joined_by_value_as_in_jfuzzylogic():
-    assert Arbiter(system=reads(BLOCKS, "fcl"))([1.0]) == pytest.approx(((1.0 + 3.0) / 2.0,))  # not (1 + 1 + 3) / 3
+    assert Arbiter(reads(BLOCKS, "fcl"))([1.0]) == pytest.approx(((1.0 + 3.0) / 2.0,))  # not (1 + 1 + 3) / 3
     ours = BLOCKS.replace("TERM on := (0, 0) (1, 1)", "TERM on := Ramp 0.0 1.0")  # a word of fuzzylite, which adds them
-    assert Arbiter(system=reads(ours, "fcl"))([1.0]) == pytest.approx(((1.0 + 1.0 + 3.0) / 3.0,))
+    assert Arbiter(reads(ours, "fcl"))([1.0]) == pytest.approx(((1.0 + 1.0 + 3.0) / 3.0,))
 
 
 def test_a_default_may_lie_outside_the_values():
@@ -159,7 +160,7 @@ def test_a_default_may_lie_outside_the_values():
     singletons = "TERM lo := 10; TERM hi := 100; METHOD : COGS; DEFAULT := 0;"
     sets = "TERM lo := (10, 0) (20, 1) (30, 0); TERM hi := (30, 0) (90, 1) (100, 0); METHOD : COG; DEFAULT := 0;"
     for terms in (singletons, sets):
-        arbiter = Arbiter(system=reads(DEFAULT.format(terms), "fcl"))
+        arbiter = Arbiter(reads(DEFAULT.format(terms), "fcl"))
         assert (arbiter([0.0])["y"], arbiter.batch([[0.0], [1.0]])[0, 0]) == (0.0, 0.0)
         assert reads(writes(arbiter.system, "fcl"), "fcl").outputs[0].default == 0.0
 

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import Arbiter, prioritized
+from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.__main__ import main
+from fuzzy_arbiter.criteria import prioritized
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import FORMATS, load, save, writes
 from tests.fuzzy_arbiter.formats.systems import TIPPING

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable, falling, prioritized, rising, trapezoid, triangle
+from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable, falling, rising, trapezoid, triangle
+from fuzzy_arbiter.criteria import prioritized
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.terms.curves import curve

@@ -4,19 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import (
-    Arbiter,
-    Output,
-    Shape,
-    System,
-    Term,
-    Variable,
-    falling,
-    prioritized,
-    rising,
-    trapezoid,
-    triangle,
-)
+from fuzzy_arbiter import Arbiter, Output, Shape, System, Term, Variable, falling, rising, trapezoid, triangle
+from fuzzy_arbiter.criteria import prioritized
 from fuzzy_arbiter.errors import FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.rule import Operators
@@ -116,7 +105,7 @@ def test_names_differ_from_functions_by_capital_letters():
     system = System((v,), (Output("y", (0, 2), values, defuzzifier="average"),), ("if LE is Abs then y is Min",))
     system = replace(system, points=1000)
     assert reads(writes(system, "fll"), "fll") == system
-    assert Arbiter(system=system)([0.25])["y"] == 1.25
+    assert Arbiter(system)([0.25])["y"] == 1.25
 
 
 def test_engine_names_may_be_any_text():

@@ -6,19 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import (
-    Criterion,
-    Output,
-    Shape,
-    System,
-    Term,
-    Variable,
-    falling,
-    prioritized,
-    rising,
-    trapezoid,
-    triangle,
-)
+from fuzzy_arbiter import Output, Shape, System, Term, Variable, falling, rising, trapezoid, triangle
+from fuzzy_arbiter.criteria import Criterion, prioritized
 from fuzzy_arbiter.errors import DefinitionError, FormatError
 from fuzzy_arbiter.formats import reads, writes
 from tests.fuzzy_arbiter.formats.systems import FAULTS, FOREIGN, REFUSED, TIPPING

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Arbiter, Output, System, Variable, falling, prioritized, rising, trapezoid, triangle
+from fuzzy_arbiter import Arbiter, Output, System, Variable, falling, rising, trapezoid, triangle
+from fuzzy_arbiter.criteria import prioritized
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.errors import EngineError, UnsupportedError
 from fuzzy_arbiter.formats import fold_normalization
@@ -92,4 +93,4 @@ def test_an_output_without_rules_has_no_range():
     y, z = (Output(name, (0, 1), {"high": rising(0, 1)}, aggregation="probor") for name in "yz")
     made = System((Variable("x", (0, 1), {"on": rising(0, 1)}),), (y, z), ("if x is on then y is high",))
     with pytest.raises(EngineError, match="output 'z': no rule concludes on it"):
-        Arbiter(system=replace(made, outputs=(z, y), normalization="range"))
+        Arbiter(replace(made, outputs=(z, y), normalization="range"))

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fuzzy_arbiter import Output, Shape, System, Term, Variable, falling, prioritized, rising, trapezoid, triangle
+from fuzzy_arbiter import Output, Shape, System, Term, Variable, falling, rising, trapezoid, triangle
+from fuzzy_arbiter.criteria import prioritized
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.formats import FORMATS, fold_normalization, load, reads, writes
 from tests.fuzzy_arbiter.formats.other_tools import DATA, TOOLS

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Arbiter, ArbiterError, Output, Shape, System, Term, Variable, prioritized
+from fuzzy_arbiter import Arbiter, ArbiterError, Output, Shape, System, Term, Variable
+from fuzzy_arbiter.criteria import prioritized
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import FORMATS, reads, writes
 from fuzzy_arbiter.hierarchy import FORMS
@@ -31,7 +32,7 @@ def test_richer_systems_round_trip_with_equal_results(format):
     again = reads(writes(system, format), format)
     assert again == system
     rows = [[2.5, 3.0], [6.5, 3.0], [9.0, 9.5]]
-    assert Arbiter(system=again).batch(rows).tolist() == Arbiter(system=system).batch(rows).tolist()
+    assert Arbiter(again).batch(rows).tolist() == Arbiter(system).batch(rows).tolist()
 
 
 @pytest.mark.medium(fast=2)

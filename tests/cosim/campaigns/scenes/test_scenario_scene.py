@@ -19,7 +19,8 @@ from cosim.campaigns.scenes.mismatches import is_admitted, make_mismatch
 from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.trials import make_trial
 from cosim.errors import ScenarioError
-from fuzzy_arbiter import Arbiter, prioritized
+from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter.criteria import prioritized
 from plant_fmu import load_vehicle
 
 GAINS = LAWS["deployable"].gains_type()
@@ -247,7 +248,7 @@ def test_scene_uses_its_own_vehicle():
 def test_arbiter_file_weights_the_criteria_of_any_scene(tmp_path):
     """The paper's rules, from a file, give the same run as the scenario's own; others reject unknown criteria."""
     file = tmp_path / "mine.json"
-    Arbiter(system=prioritized()).save(file)
+    Arbiter(prioritized()).save(file)
     (scene,) = (decode_scene(line.encode()) for line in generate_scenes(1, 3, "hard"))
     ends = []
     for arbiter in ("ordered", str(file)):
