@@ -46,12 +46,12 @@ def _expand(patterns: tuple[str, ...], names: list[str]) -> tuple[str, ...]:
     return tuple(name for name in names if name in exact or (beginnings and name.startswith(beginnings)))
 
 
-def _along(i: int) -> str:
+def _axis_text(i: int) -> str:
     """Describe the body axis along or about which component `i` of a velocity or a wrench is."""
     return f"{'along' if i < 3 else 'about'} body {AXES[i % 3]}"
 
 
-# ---- what moves ----
+# ---- states and inputs ----
 
 
 def _states(vehicle: Vehicle) -> Iterator[Variable]:
@@ -64,7 +64,7 @@ def _states(vehicle: Vehicle) -> Iterator[Variable]:
         yield Variable(f"quaternion.e{i}", "state", f"state.rigid[{3 + i}]", q.QUATERNION, description, start)
     for i, name in enumerate(VELOCITIES):
         kind, quantity = ("Velocity over ground", q.SPEED) if i < 3 else ("Angular velocity", q.ANGULAR_SPEED)
-        yield Variable(f"velocity.{name}", "state", f"state.rigid[{7 + i}]", quantity, f"{kind} {_along(i)}")
+        yield Variable(f"velocity.{name}", "state", f"state.rigid[{7 + i}]", quantity, f"{kind} {_axis_text(i)}")
     unlagged = "without a lag equal to its command, updated at initialization and events"
     for i in range(vehicle.n_thrusters):
         description = f"Force of thruster {i + 1} after its lag, before its effectiveness; {unlagged}"
@@ -82,11 +82,11 @@ def _inputs(vehicle: Vehicle) -> Iterator[Variable]:
         yield Variable(f"thrust[{i + 1}]", "input", f"inputs.thrust[{i}]", q.FORCE, description)
     for i, name in enumerate(FORCES):
         kind, quantity = ("force", q.FORCE) if i < 3 else ("moment", q.MOMENT)
-        description = f"Commanded {kind} on the body {_along(i)}, in addition to the thrusters"
+        description = f"Commanded {kind} on the body {_axis_text(i)}, in addition to the thrusters"
         yield Variable(f"wrench.{name}", "input", f"inputs.wrench[{i}]", quantity, description)
 
 
-# ---- what is calculated ----
+# ---- outputs and derivatives ----
 
 _THRUSTER = (
     "thrust", "thrust_min", "thrust_max", "thrust_dead_band", "thrust_curve", "thrust_time_constant",
@@ -133,9 +133,9 @@ def _outputs(vehicle: Vehicle) -> Iterator[Variable]:
         yield output(f"thruster_force[{i + 1}]", f"thrust[{i}]", q.FORCE, description, *depends)
     for i, name in enumerate(FORCES):
         kind, quantity = ("Force", q.ALL_FORCES) if i < 3 else ("Moment", q.ALL_MOMENTS)
-        pushing = (f"thruster_matrix[{i + 1},*", "thrust[*", "thrust_*", "actuator.thrust*", "supply_voltage")
-        description = f"{kind} of all actuators on the body {_along(i)}"
-        yield output(f"actuation.{name}", f"wrench[{i}]", quantity, description, *_wrench_names(i, *pushing))
+        thruster_names = (f"thruster_matrix[{i + 1},*", "thrust[*", "thrust_*", "actuator.thrust*", "supply_voltage")
+        description = f"{kind} of all actuators on the body {_axis_text(i)}"
+        yield output(f"actuation.{name}", f"wrench[{i}]", quantity, description, *_wrench_names(i, *thruster_names))
 
 
 def _measured(output: Callable[..., Variable]) -> Iterator[Variable]:
@@ -147,14 +147,14 @@ def _measured(output: Callable[..., Variable]) -> Iterator[Variable]:
     channels: list[str] = []
     yield measured("depth", "m", "Depth from the pressure sensor", "depth_sensor", "position.z")
     for name in VELOCITIES[:3]:
-        description = f"DVL's velocity over ground {_along(VELOCITIES.index(name))}"
+        description = f"DVL's velocity over ground {_axis_text(VELOCITIES.index(name))}"
         yield measured(f"velocity.{name}", "m/s", description, "dvl", f"velocity.{name}")
     yield measured("altitude", "m", "DVL's height above the bottom", "dvl", *_BOTTOM)
     for i, axis in enumerate(AXES):
-        description = f"IMU's specific force (acceleration less gravity) {_along(i)}"
+        description = f"IMU's specific force (acceleration less gravity) {_axis_text(i)}"
         yield measured(f"acceleration.{axis}", "m/s2", description, "imu", "gravity", "thruster_matrix*", *_MOTION)
     for i, name in enumerate(VELOCITIES[3:]):
-        description = f"IMU's angular velocity {_along(3 + i)}"
+        description = f"IMU's angular velocity {_axis_text(3 + i)}"
         yield measured(f"angular_velocity.{name}", "rad/s", description, "imu", f"velocity.{name}")
     yield measured("heading", "rad", "Compass heading, that of yaw", "compass", "quaternion.*")
     for i, where in enumerate(("north", "east", "down")):
