@@ -12,11 +12,12 @@ from cosim.command_line.flags import add_changes, add_scenario, add_verb, flag, 
 def add_verbs(verbs: Any) -> None:
     """Add the verbs to the subparsers of the command."""
     verb = add_verb(
-        verbs, "show", show, "print a scenario with every default and every key explained, or the shipped scenarios",
-        "scenarios", ("show", "show docking", "show paper --set limit.force=500"),
+        verbs, "show", show, "print a scenario with every key explained, or the shipped scenarios",
+        "scenarios", ("show", "show docking --short", "show paper --set limit.force=500"),
     )  # fmt: skip
     add_scenario(verb, nargs="?")
     add_changes(verb)
+    flag(verb, "--short", "without the keys that have their default: a beginning for a scenario of one's own")
     flag(verb, "--json", "print the list of shipped scenarios as JSON")
 
     verb = add_verb(
@@ -33,7 +34,7 @@ def show(options: argparse.Namespace) -> int:
     from cosim.scenario.toml_file import shipped_titles
 
     if options.scenario is None:
-        refuse_flags(options, ["set"], "a scenario with it")
+        refuse_flags(options, ["set", "short"], "a scenario with it")
         titles = shipped_titles()
         if options.json:
             print(json.dumps([{"name": name, "title": title} for name, title in titles.items()], indent=2))
@@ -46,7 +47,7 @@ def show(options: argparse.Namespace) -> int:
     scenario = load_scenario(options.scenario, options.set)
     file = scenario.vehicle_file
     vehicle = str(file.resolve()) if file else None  # found from wherever the output goes
-    print(scenario.toml(vehicle, commented=True), end="")
+    print(scenario.toml(vehicle, commented=True, short=options.short), end="")
     return 0
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import difflib
 import functools
 import inspect
 import re
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -14,9 +16,10 @@ from controller import LAWS
 from controller.regions.shapes import ENTRIES
 from cosim.scenario.region_tables import GoalMotion
 from cosim.scenario.tables import File
+from plant_fmu.errors import PlantFmuError
 from plant_fmu.toml_tables import Table, fields_of, table_in, types_in
 from plant_fmu.variables import variables
-from plant_fmu.vehicle import Vehicle
+from plant_fmu.vehicle import Vehicle, load_vehicle
 
 
 class Key(NamedTuple):
@@ -58,6 +61,46 @@ def _default(field: msgspec.structs.FieldInfo) -> str:
 
 
 KEYS = dict(_keys_of(File))  # keys by their path; regions[] means each region
+
+
+def without_defaults(table: Mapping[str, Any], kind: type[Table] = File) -> dict[str, Any]:
+    """Return a filled table without the keys that have their default."""
+    short = {}
+    for field in msgspec.structs.fields(kind):
+        value = table[field.name]
+        default = field.default if field.default_factory is msgspec.NODEFAULT else field.default_factory()
+        if field.required or value != msgspec.to_builtins(default):
+            inner, listed = table_in(fields_of(kind)[field.name])
+            if inner is not None and listed:
+                value = [without_defaults(item, inner) for item in value]
+            elif inner is not None and "type" not in value:  # as shapes have, of which there are several tables
+                value = without_defaults(value, inner)
+            short[field.name] = value
+    return short
+
+
+_CLOSE = 0.75  # least similarity to a key of the file's first level that alone is proposed
+_SIMILAR = 0.6  # least similarity to the last part of a key elsewhere
+_MAX_PROPOSED = 3
+
+
+def hint_of_key(name: str, vehicle: object) -> str:
+    """Format a hint for an unknown key of a file: the nearest one, or those in its tables that resemble it."""
+    if near := difflib.get_close_matches(name, File.__struct_fields__, n=1, cutoff=_CLOSE):
+        return f"did you mean {near[0]!r}?"
+    keys = {key.replace("[]", "") for key in KEYS}
+    if isinstance(vehicle, str):
+        with contextlib.suppress(PlantFmuError):
+            names = (v.name for v in variables(load_vehicle(vehicle)) if v.role == "parameter")
+            keys |= {f"plant.parameters.{name.partition('[')[0]}" for name in names}
+    similarity = {key: difflib.SequenceMatcher(None, name, key.rpartition(".")[2]).ratio() for key in sorted(keys)}
+    near = [key for key in sorted(similarity, key=similarity.__getitem__, reverse=True) if similarity[key] >= _SIMILAR]
+    return (
+        f"did you mean {' or '.join(near[:_MAX_PROPOSED])}?"
+        if near
+        else f"expected one of {', '.join(File.__struct_fields__)}"
+    )
+
 
 _GAIN = re.compile(r"^ +(\w+): float = [^#\n]*# (.*)$", re.M)
 _UNIT = re.compile(

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from controller import ControllerError
+from controller import LAWS, ControllerError
 from controller.regions import Region
 from controller.regions.region_set import shape_entry
 from controller.regions.shape import Shape
@@ -22,8 +22,9 @@ from cosim.scenario.arbiter_rules import ArbiterRules, check_rules, read_rules
 from cosim.scenario.changes import changed_keys, differing_keys, join_keys, shown_title, with_values
 from cosim.scenario.criteria import PAPER, CriterionSetup, check_criteria, check_criteria_of_regions, fill_criteria
 from cosim.scenario.crossing_costs import with_crossing_costs
-from cosim.scenario.keys import comments
+from cosim.scenario.keys import comments, hint_of_key, without_defaults
 from cosim.scenario.region_tables import PAPER_CRITERIA, SecondaryRegion, Vector3
+from cosim.scenario.roll_pitch_yaw import with_quaternions
 from cosim.scenario.tables import (
     Actuation,
     ArbiterSetup,
@@ -48,6 +49,7 @@ from cosim.scenario.validation import (
     check_law,
     check_regions,
     check_tables,
+    expand_parameters,
     obstacle_slots,
     steps_per_period,
 )
@@ -108,7 +110,7 @@ class Scenario:
     compare: str  # name of the claims with which the report compares the run
     table: dict[str, Any]  # table of the file with defaults filled in
 
-    def toml(self, vehicle: str | None = None, commented: bool = False) -> str:
+    def toml(self, vehicle: str | None = None, commented: bool = False, short: bool = False) -> str:
         """Format the scenario as a TOML file.
 
         Parameters
@@ -117,14 +119,21 @@ class Scenario:
             Other name for the vehicle's file.
         commented : bool
             True to add a comment with unit and meaning to each key.
+        short : bool
+            True to leave out the keys that have their default.
 
         Returns
         -------
         str
-            TOML text, with every default filled in.
+            TOML text.
         """
+        table = self.table | ({"vehicle": vehicle} if vehicle else {})
+        if short:
+            defaults = LAWS[self.law.name].gains_type()._asdict() if self.law.name in LAWS else {}
+            gains = dict(table["law"]["gains"].items() - defaults.items())
+            table = without_defaults(table | {"law": table["law"] | {"gains": gains}})
         return scenario_text(
-            self.table | ({"vehicle": vehicle} if vehicle else {}),
+            table,
             comments(self.law.name, self.vehicle) if commented else {},
         )
 
@@ -288,23 +297,31 @@ def _with_changes(scenario: Scenario, table: dict[str, Any], titled: dict[str, A
 
 def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> Scenario:
     """Make a scenario from the table of its file."""
-    return make_scenario(read_tables(table, name), name, vehicle)
+    return make_scenario(read_tables(table, name, vehicle), name, vehicle)
 
 
-def read_tables(table: dict[str, Any], name: str) -> File:
+def read_tables(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> File:
     """Check each table of a scenario's file, and fill in the defaults."""
-    table = rename_former_keys(table)
+    table = with_quaternions(rename_former_keys(table))
     plant = table.get("plant")
     if isinstance(plant, dict) and isinstance(plant.get("parameters"), dict):
         table = table | {"plant": plant | {"parameters": flatten(plant["parameters"])}}
+    for key in table.keys() - File.__struct_fields__:
+        raise ScenarioError(f"{key}: unknown key; {hint_of_key(key, table.get('vehicle'))}")
     file: File = decode(table, File)
+    parameters = expand_parameters(file.plant.parameters, vehicle or _vehicle_of(file))
     return msgspec.structs.replace(
         file,
         title=file.title or name,
+        plant=msgspec.structs.replace(file.plant, parameters=parameters),
         law=msgspec.structs.replace(file.law, gains=file.law.setup.gains._asdict()),
         criteria=fill_criteria(file.criteria),
         arbiter=read_rules(file.arbiter),
     )
+
+
+def _vehicle_of(file: File) -> Vehicle:
+    return load_vehicle(Path(file.vehicle) if file.vehicle.endswith(".toml") else file.vehicle)
 
 
 def make_scenario(file: File, name: str, vehicle: Vehicle | None = None) -> Scenario:
@@ -317,8 +334,7 @@ def make_scenario(file: File, name: str, vehicle: Vehicle | None = None) -> Scen
     slots = obstacle_slots(file)
     check_criteria_of_regions(regions + slots, criteria)
     rules = check_rules(file.arbiter, criteria, regions)
-    vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
-    vehicle = vehicle or load_vehicle(vehicle_file or file.vehicle)
+    vehicle = vehicle or _vehicle_of(file)
     law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions) + len(slots))
     check_tables(file, regions, vehicle)
     regions = with_crossing_costs(regions, tuple(c.name for c in criteria), rules, file.initial.position[2])
@@ -326,7 +342,7 @@ def make_scenario(file: File, name: str, vehicle: Vehicle | None = None) -> Scen
     return Scenario(
         name=name,
         vehicle=vehicle,
-        vehicle_file=vehicle_file,
+        vehicle_file=Path(file.vehicle) if file.vehicle.endswith(".toml") else None,
         **{name: getattr(file, name) for name in _AS_READ},
         steps=steps_per_period("time.duration", time.duration, time.step),
         control_every=steps_per_period("time.control", time.control, time.step),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import fnmatch
 import functools
 import logging
 import re
@@ -17,7 +18,9 @@ from plant_fmu.errors import TableError, printable
 
 _LOG = logging.getLogger(__name__)
 _RENAMED = {"centre": "center", "colour": "color"}  # former names of keys
-_OTHER_SPELLING = _RENAMED | {new: old for old, new in _RENAMED.items()}
+ANGLE_KEYS = {"quaternion": "roll_pitch_yaw", "desired_quaternion": "desired_roll_pitch_yaw"}
+_IN_ITS_PLACE = _RENAMED | ANGLE_KEYS  # of two keys for one thing, the one that the other replaces
+_IN_ITS_PLACE |= {new: old for old, new in _IN_ITS_PLACE.items()}
 _SHOWN = 80  # maximum number of characters quoted in a message
 
 # a key: parts with dots between them, and TOML's quotes around those that have blanks; and a key with a value
@@ -118,7 +121,7 @@ def _name_rules(table: dict[str, Any]) -> None:
 def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     result = copy.deepcopy(base)
     for key, value in over.items():
-        if (other := _OTHER_SPELLING.get(key, "")) not in over:
+        if (other := _IN_ITS_PLACE.get(key, "")) not in over:
             result.pop(other, None)
         both = isinstance(value, dict) and isinstance(result.get(key), dict)
         result[key] = _merge(result[key], value) if both else value
@@ -174,8 +177,15 @@ def override(table: dict[str, Any], text: str) -> None:
 
 
 def set_key(table: dict[str, Any], key: str, value: Any) -> None:
-    """Set one key of a table in place."""
+    """Set one key of a table in place, or all keys that a pattern with ``*`` matches."""
     key = plain_key(key)
+    if "*" in key and not key.startswith("plant.parameters."):  # that table may lack parameters that are meant
+        keys = list(_matching_keys(table, key.split(".")))
+        if not keys:
+            raise ScenarioError(f"--set {_short(key)}: no key matches")
+        for one in keys:
+            set_key(table, one, value)
+        return
     *path, last = key.split(".")
     if key == "law.name":
         _name_law(table, value)
@@ -190,10 +200,25 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
     if isinstance(node, list):
         node[_index(node, last, key)] = value
     elif isinstance(node, dict):
-        node.pop(_OTHER_SPELLING.get(last, ""), None)
+        node.pop(_IN_ITS_PLACE.get(last, ""), None)
         node[last] = value
     else:
         raise ScenarioError(f"--set {_short(key)}: there is no table at {_short('.'.join(path))!r}")
+
+
+def _matching_keys(node: Any, parts: list[str], path: tuple[str, ...] = ()) -> Iterator[str]:
+    """Yield the keys that a pattern matches, part by part; the last part may be missing unless it is a pattern."""
+    part, *rest = parts
+    names = [part]
+    if "*" in part:
+        items = node if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ()
+        names = [str(name) for name in items if fnmatch.fnmatchcase(str(name), part)]
+        names = [name for name in map(str, _names(node)) if fnmatch.fnmatchcase(name, part)] or names
+    for name in names:
+        if not rest:
+            yield ".".join((*path, name))
+        elif (index := _find_key(node, name)) is not None:
+            yield from _matching_keys(node[index], rest, (*path, name))
 
 
 def _short(text: str) -> str:

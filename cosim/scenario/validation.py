@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import math
+import re
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -97,16 +99,24 @@ def check_tables(file: File, regions: tuple[SecondaryRegion, ...], vehicle: Vehi
         last = ends.get(outage.sensor, -math.inf)
         _require(outage.time > last, f"outages[{i}].time", outage.time, f"above {last} s, the end of the one before")
         ends[outage.sensor] = outage.time + outage.duration
-    known = known_parameters(vehicle)
-    for name in file.plant.parameters:
-        if name not in known:
-            own = _OWN_KEYS.get(name.partition(".")[0])
-            tip = f"set {own} instead" if own else hint(name, known)
-            raise ScenarioError(f"plant.parameters.{name} is no parameter of the FMU, expected one; {tip}")
     if file.record.lyapunov:
         _require(file.law.name == "ismail_dunnigan", "record.lyapunov", "true", "false: V of (31) is the paper's law's")
         names = [r.region.name for r in regions if of_attitude(r.region.shape)]
         _require(not names, "record.lyapunov", "true", f"false: the analysis knows no attitude in regions ({names})")
+
+
+def expand_parameters(parameters: Mapping[str, float], vehicle: Vehicle) -> dict[str, float]:
+    """Return the value of each parameter of the FMU, for names that may be patterns with ``*`` or lack an index."""
+    known, values = known_parameters(vehicle), dict[str, float]()
+    for name, value in parameters.items():
+        pattern = re.compile(re.escape(name).replace(r"\*", ".*") + r"(\[.*\])?")
+        matches = [name] if name in known else [one for one in known if pattern.fullmatch(one)]
+        if not matches:
+            own = _OWN_KEYS.get(name.partition(".")[0])
+            tip = f"set {own} instead" if own else hint(name, known)
+            raise ScenarioError(f"plant.parameters.{name} is no parameter of the FMU, expected one; {tip}")
+        values |= dict.fromkeys(matches, value)
+    return values
 
 
 @functools.lru_cache(maxsize=8)

@@ -222,7 +222,7 @@ def test_missing_compiler_gives_one_line_error(tmp_path, capsys, monkeypatch):
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     assert main(["run", "paper", "--out", str(tmp_path / "run"), *QUICK]) == 2
-    assert "no C compiler" in capsys.readouterr().err and list(tmp_path.iterdir()) == []
+    assert "no C compiler" in capsys.readouterr().err and {path.name for path in tmp_path.iterdir()} <= {"cache"}
 
 
 @pytest.mark.parametrize("value", ["-33.8,151.2", "-1,0,0", "-.5", "-1e-3", "-4:-2", "-inf"])

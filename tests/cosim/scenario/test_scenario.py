@@ -6,12 +6,16 @@ import typing
 from importlib import resources
 
 import pytest
+import tomli_w
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from controller.regions import Pipe, Sphere
 from cosim.batch.variation import Variation
 from cosim.campaigns.sweeps.design import Vary, vary_from
 from cosim.errors import CosimError, ScenarioError
-from cosim.scenario.scenario import load_scenario
+from cosim.scenario.scenario import load_scenario, validate_scenario
 from cosim.scenario.toml_file import list_scenarios
 from plant_fmu.toml_tables import Table, fields_of, types_in
 from tests.refusals import refusals
@@ -101,10 +105,55 @@ def test_overrides_reach_every_depth(tmp_path):
     assert scenario.regions[2].region.shape == Pipe(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), 0.3)
 
 
+def test_patterns_set_all_keys_that_they_match():
+    limits = {f"thrust_max[{i + 1}]": 20.0 for i in range(8)}
+    changes = ["plant.parameters.thrust_max=20", "plant.parameters.r_*=0", "regions.*wall.gain=7", "time.*=0.02"]
+    scenario = load_scenario("docking", [*changes, "plant.parameters.thrust_max[2]=5", "time.duration=1"])
+    centers = {f"{name}.{axis}": 0.0 for name in ("r_B", "r_G") for axis in "xyz"}
+    buoyancy = {"buoyancy": 134.57}
+    assert scenario.plant.parameters == buoyancy | limits | centers | {"thrust_max[2]": 5.0}
+    assert [r.region.gain for r in scenario.regions] == [10.0, 7.0, 7.0, 100.0, 100.0, 7.0]
+    assert (scenario.time.step, scenario.time.control, scenario.time.duration) == (0.02, 0.02, 1.0)
+    assert scenario.replace({"plant.parameters.thrust_max": 20}).plant.parameters == buoyancy | limits | centers
+    assert scenario.replace({"regions.*.gain": 1.0}).regions[0].region.gain == 1.0
+
+
+@given(*[st.floats(-1.5, 1.5)] * 3)
+def test_angles_replace_the_quaternion_of_every_attitude(roll, pitch, yaw):
+    angles = f"[{roll}, {pitch}, {yaw}]"
+    expected = Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_quat(scalar_first=True)
+    keys = ("initial.", "law.desired_", "regions.heading.shape.")
+    scenario = load_scenario("docking", [f"{key}roll_pitch_yaw={angles}" for key in keys])
+    shape = scenario.regions[0].region.shape
+    for attitude in (scenario.initial.quaternion, scenario.law.desired_quaternion, shape.quaternion):
+        assert attitude == pytest.approx(expected, abs=1e-12)
+    back = scenario.replace({"initial.quaternion": [1.0, 0.0, 0.0, 0.0]})
+    assert back.initial.quaternion == (1.0, 0.0, 0.0, 0.0)
+
+
+def test_a_quaternion_and_angles_at_once_are_refused(tmp_path):
+    table = load_scenario("docking").table
+    both = table | {"initial": table["initial"] | {"roll_pitch_yaw": [0.0, 0.0, 1.0]}}
+    with pytest.raises(ScenarioError, match="initial: pass either quaternion or roll_pitch_yaw"):
+        validate_scenario(both, "both")
+    angles = tomllib.loads(MINIMAL)
+    angles["initial"]["roll_pitch_yaw"] = [0.0, 0.0, 1.0]
+    file = saved(tmp_path, tomli_w.dumps(angles), "angles.toml")
+    mine = saved(tmp_path, f'base = "{file.name}"\n[initial]\nquaternion = [0.0, 0.0, 0.0, 1.0]\n', "mine.toml")
+    assert load_scenario(mine).initial.quaternion == (0.0, 0.0, 0.0, 1.0)
+
+
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
         *refusals("scenarios"),
+        ("docking thrusters=20", ["thrusters: unknown key; did you mean", "plant.parameters.thruster_matrix"]),
+        ("docking weight=20", ["weight: unknown key; did you mean plant.parameters.weight"]),
+        ("docking tmie.step=20", ["tmie: unknown key; did you mean 'time'?"]),
+        ("docking xyzzy=20", ["xyzzy: unknown key; expected one of vehicle, time,"]),
+        ("docking regions.x*.gain=20", ["regions.x*.gain: no key matches"]),
+        ("docking plant.parameters.sub*=20", ["sub* is no parameter of the FMU"]),
+        ("docking initial.roll_pitch_yaw=90", ["initial.roll_pitch_yaw: expected a list"]),
         ("paper time.duration=1\nb=2", ["one key=value"]),
         ('paper intersection=["SR1"]\nregions=[]', ["one key=value"]),
         ("paper regions.SR1.name=$\\frac$", ["name"]),

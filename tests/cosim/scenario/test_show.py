@@ -40,6 +40,9 @@ def test_shown_scenario_round_trips(name, shown, tmp_path):
     assert again.vehicle.name == first.vehicle.name
     assert again.toml() == first.toml()  # which the folder of a run holds
     assert shown(str(tmp_path / "mine.toml")) == (tmp_path / "mine.toml").read_text()
+    (tmp_path / "short.toml").write_text(shown(name, "--short"))
+    assert len((tmp_path / "short.toml").read_text()) < 0.9 * len((tmp_path / "mine.toml").read_text())
+    assert load_scenario(tmp_path / "short.toml").table == again.table
 
 
 CORNERS = [[float(i), 0.123456789 * i * i] for i in range(12)]
