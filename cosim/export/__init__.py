@@ -2,7 +2,7 @@
 
 `formats` lists them with their writers, which are imported at their first use. Public: `export_run`.
 
-Imports: controller, io, mavlink, mavlink.wire, plant_fmu, replay, results, scenario, simulation.
+Imports: controller, io, mavlink, mavlink.wire, plant_fmu, replay, results, simulation.
 """
 
 from cosim.export.exporting import export_run

@@ -13,7 +13,7 @@ from controller.regions.shape import Bounds, Shape
 from cosim.export.excerpt import Excerpt
 from cosim.replay.header import header_of
 from cosim.replay.region_changes import changes_of, log_of
-from cosim.scenario.colors import colors_of_regions
+from cosim.results.region_colors import colors_of_regions
 from cosim.simulation.signals import Array
 
 NED, PLACE, BODY = "ned", "place", "body"  # frames: world; at the vehicle, parallel to the world; body

@@ -10,8 +10,8 @@ import numpy as np
 
 from controller.regions.region_set import name_of, of_attitude, shape_entry, surface_of
 from controller.regions.shape import Bounds, Shape
+from cosim.results.region_colors import colors_of_regions
 from cosim.results.wording import describe_task
-from cosim.scenario.colors import colors_of_regions
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import Mode
 from cosim.simulation.environment import shape_center

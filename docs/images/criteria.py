@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from small import write
 
+from cosim.results.region_colors import GOAL_COLOR
 from cosim.results.run_result import Run
 from cosim.run.run_scenario import run_scenario
-from cosim.scenario.colors import GOAL_COLOR
 from cosim.scenario.scenario import load_scenario
 
 FLIGHTS = {  # as labels have it: changes, color, dashes

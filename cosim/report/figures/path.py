@@ -34,7 +34,7 @@ from cosim.report.figures.style import (
     region_instances,
 )
 from cosim.report.figures.trajectory import SampledPath, sample_path
-from cosim.scenario.colors import GOAL_COLOR
+from cosim.results.region_colors import GOAL_COLOR
 from cosim.simulation.signals import Array
 
 SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # view of north and depth, looking west

@@ -15,7 +15,7 @@ from matplotlib.rcsetup import cycler
 from controller.regions import Region
 from controller.regions.region_set import of_attitude, shape_entry
 from cosim.results.record import Rows
-from cosim.scenario.colors import colors_of_regions
+from cosim.results.region_colors import colors_of_regions
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 

@@ -14,8 +14,8 @@ from cosim.report.figures.layout import limits_of, log_axis
 from cosim.report.figures.panels import DASHES, Line, Panel, draw_panels, fit, fit_spikes, percentile
 from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, FigureData, regions_of, shifts_of
 from cosim.results.record import Rows
+from cosim.results.region_colors import GOAL_COLOR
 from cosim.results.spans import spans
-from cosim.scenario.colors import GOAL_COLOR
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import MODES
 from cosim.simulation.signals import Array

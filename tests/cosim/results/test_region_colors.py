@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from cosim.scenario.colors import colors_of_regions
+from cosim.results.region_colors import colors_of_regions
 from cosim.scenario.scenario import load_scenario
 
 
