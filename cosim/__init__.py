@@ -16,10 +16,14 @@ import warnings
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from cosim.campaigns import Campaign, Comparison, Design, compare, run_campaign, run_sweep, vary_from
+    from cosim.campaigns.campaign import run_campaign
+    from cosim.campaigns.comparison import Comparison, compare
+    from cosim.campaigns.parameter_sweep import run_sweep
+    from cosim.campaigns.runner import Campaign
     from cosim.campaigns.scenes.flyer import SceneFlyer
     from cosim.campaigns.scenes.generator import generate_scenes
     from cosim.campaigns.scenes.scene_file import read_scenes
+    from cosim.campaigns.sweeps.design import Design, vary_from
     from cosim.companion.autopilot_link import NetworkLink
     from cosim.companion.companion_options import CompanionOptions
     from cosim.companion.companion_run import Companion
@@ -73,11 +77,15 @@ __all__ = [
 ]
 
 _EXPORTS = {
-    "campaigns": {"Campaign", "Comparison", "Design", "compare", "run_campaign", "run_sweep", "vary_from"},
+    "campaigns.campaign": {"run_campaign"},
+    "campaigns.comparison": {"Comparison", "compare"},
+    "campaigns.parameter_sweep": {"run_sweep"},
+    "campaigns.runner": {"Campaign"},
     "campaigns.scenes.flyer": {"SceneFlyer"},
     "campaigns.scenes.generator": {"generate_scenes"},
     "campaigns.scenes.scene": {"Scene"},
     "campaigns.scenes.scene_file": {"read_scenes"},
+    "campaigns.sweeps.design": {"Design", "vary_from"},
     "companion.companion_run": {"Companion"},
     "companion.frame_alignment": {"SceneOrigin"},
     "companion.autopilot_link": {"NetworkLink"},

@@ -15,7 +15,7 @@ from cosim.command_line.process import say, say_if_interrupted
 from cosim.errors import RunError
 
 if TYPE_CHECKING:
-    from cosim.campaigns import Campaign
+    from cosim.campaigns.runner import Campaign
     from cosim.campaigns.sweeps.design import Vary
 
 _SENSING = ("state", "sensors")  # with the scenes' noise; or IMU, DVL, compass, pressure sensor and USBL
@@ -130,7 +130,7 @@ def refuse_both(vary: Sequence[Vary], changes: Sequence[str]) -> None:
 
 def campaign(options: argparse.Namespace) -> int:
     """Run ``cosim campaign``."""
-    from cosim.campaigns import run_campaign
+    from cosim.campaigns.campaign import run_campaign
     from cosim.campaigns.pages.campaign_page import campaign_lines, write_campaign_page
     from cosim.campaigns.scenes.law_gains import gains_from
 
@@ -148,7 +148,7 @@ def campaign(options: argparse.Namespace) -> int:
 
 def compare(options: argparse.Namespace) -> int:
     """Run ``cosim compare``."""
-    from cosim.campaigns import compare as compare_laws
+    from cosim.campaigns.comparison import compare as compare_laws
     from cosim.campaigns.pages.comparison_page import write_comparison_page
     from cosim.campaigns.scenes.law_gains import gains_by_law
 

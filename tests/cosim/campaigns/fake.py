@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cosim.batch.outcome import FIELDS, BatchResult, empty_outcomes
-from cosim.campaigns import Design, vary_from
 from cosim.campaigns.sweeps import sweep_rows
+from cosim.campaigns.sweeps.design import Design, vary_from
 from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
 

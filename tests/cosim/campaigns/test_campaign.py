@@ -11,8 +11,8 @@ import pytest
 from msgspec.structs import replace
 
 from controller.paper_law import Gains
-from cosim.campaigns import run_campaign
 from cosim.campaigns.analysis.campaign_summary import summarize_campaign
+from cosim.campaigns.campaign import run_campaign
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer, Score
 from cosim.campaigns.scenes.law_gains import gains_by_law, gains_from

@@ -5,11 +5,10 @@ import re
 import pytest
 
 from cosim.batch.outcome import FIELDS
-from cosim.campaigns import vary_from
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.scene import Scene
 from cosim.campaigns.scenes.scene_rows import SCHEMA
-from cosim.campaigns.sweeps.design import KINDS
+from cosim.campaigns.sweeps.design import KINDS, vary_from
 from plant_fmu.toml_tables import fields_of, table_in
 from tests.test_reference_tables import DOCS, rows
 

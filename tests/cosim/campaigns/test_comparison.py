@@ -7,8 +7,7 @@ import pytest
 
 from controller import LAWS, IsmailDunniganLaw
 from controller.paper_law import Gains
-from cosim.campaigns import compare
-from cosim.campaigns.comparison import medians_where_completed, paired_differences
+from cosim.campaigns.comparison import compare, medians_where_completed, paired_differences
 from cosim.campaigns.pages.comparison_page import write_comparison_page
 from cosim.campaigns.scenes.flyer import Score
 from cosim.campaigns.scenes.scene_rows import row_of

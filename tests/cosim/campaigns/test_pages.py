@@ -8,13 +8,15 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from cosim.campaigns import compare, run_campaign, run_sweep
 from cosim.campaigns.analysis.statistics import quantiles
+from cosim.campaigns.campaign import run_campaign
+from cosim.campaigns.comparison import compare
 from cosim.campaigns.pages.campaign_figures import cumulative_fractions, distributions
 from cosim.campaigns.pages.campaign_page import write_campaign_page
 from cosim.campaigns.pages.comparison_page import write_comparison_page
 from cosim.campaigns.pages.sections import SECTIONS
 from cosim.campaigns.pages.sweep_page import write_sweep_page
+from cosim.campaigns.parameter_sweep import run_sweep
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 from cosim.report.web_page import number

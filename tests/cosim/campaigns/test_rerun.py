@@ -8,11 +8,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from cosim.campaigns import Design, run_campaign, run_sweep, vary_from
+from cosim.campaigns.campaign import run_campaign
+from cosim.campaigns.parameter_sweep import run_sweep
 from cosim.campaigns.rerun import rerun
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.conflicts import make_conflict
 from cosim.campaigns.store.folder import RESULTS
+from cosim.campaigns.sweeps.design import Design, vary_from
 from cosim.campaigns.workers.dispatch import KILLED
 from cosim.command_line.cli import main
 from cosim.errors import RunError

@@ -16,7 +16,7 @@ import pytest
 from scipy.stats import norm
 
 from cosim.batch.outcome import FIELDS
-from cosim.campaigns import run_sweep
+from cosim.campaigns.parameter_sweep import run_sweep
 from cosim.campaigns.scenes.scene_rows import SCHEMA
 from cosim.campaigns.store.folder import RESULTS
 from cosim.campaigns.store.results import make_table, to_array
@@ -255,7 +255,7 @@ def test_command_prints_the_sweep_result(tmp_path, fakes, capsys):
 _WITHOUT_PANDAS = """
 import sys
 from pathlib import Path
-from cosim.campaigns import run_sweep
+from cosim.campaigns.parameter_sweep import run_sweep
 from cosim.campaigns.scenes.scene_rows import refused_row, table_of
 from cosim.campaigns.sweeps import sweep_rows
 from tests.cosim.campaigns.fake import Fake, design, paper
@@ -293,7 +293,7 @@ def test_tables_equal_those_of_pyarrow(n):
 _MEMORY = """
 import sys
 from pathlib import Path
-from cosim.campaigns import run_sweep
+from cosim.campaigns.parameter_sweep import run_sweep
 from cosim.campaigns.store import row_log
 from cosim.campaigns.sweeps import sweep_rows
 from cosim.campaigns.workers import dispatch

@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from cosim.batch.outcome import FIELDS
-from cosim.campaigns import run_sweep
+from cosim.campaigns.parameter_sweep import run_sweep
 from cosim.campaigns.store.folder import PARTS, RESULTS
 from cosim.campaigns.store.results import Results
 from cosim.campaigns.workers.dispatch import KILLED

@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from cosim.campaigns import run_campaign
+from cosim.campaigns.campaign import run_campaign
 from cosim.campaigns.store.folder import RESULTS
 from cosim.campaigns.store.results import Results
 from cosim.command_line.cli import main

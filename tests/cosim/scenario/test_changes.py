@@ -8,7 +8,7 @@ import pytest
 
 from controller import FunctionLaw
 from cosim.batch.variation import Variation
-from cosim.campaigns import run_sweep
+from cosim.campaigns.parameter_sweep import run_sweep
 from cosim.campaigns.rerun import repeat_of
 from cosim.precheck.output import check_text
 from cosim.precheck.precheck import check_scenario

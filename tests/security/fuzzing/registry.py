@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 
 from controller import ControllerError
-from cosim.campaigns import Design, compare, run_sweep, vary_from
+from cosim.campaigns.comparison import compare
+from cosim.campaigns.parameter_sweep import run_sweep
 from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.sweeps.design import Design, vary_from
 from cosim.errors import CosimError
 from cosim.scenario.scenario import load_scenario
 from fuzzy_arbiter import ArbiterError

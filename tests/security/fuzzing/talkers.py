@@ -13,8 +13,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from rich.console import Console
 
 from controller.laws import LAWS
-from cosim.campaigns import vary_from
 from cosim.campaigns.scenes.law_gains import gains_from
+from cosim.campaigns.sweeps.design import vary_from
 from cosim.live.address import foreign_origin, parse_live
 from cosim.live.command_desk import MAX_LENGTH, CommandDesk
 from cosim.live.viewer_messages import format_message, write_rows

@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from cosim.campaigns import run_campaign, vary_from
+from cosim.campaigns.campaign import run_campaign
 from cosim.campaigns.falsification import falsification as module
 from cosim.campaigns.falsification.falsification import costs_of, run_falsification
 from cosim.campaigns.falsification.search_work import ScenarioSearch, SceneSearch, SearchSettings
@@ -21,6 +21,7 @@ from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.campaigns.scenes.scene_rows import refused_row, row_of, table_of
 from cosim.campaigns.scenes.scene_work import SceneTask
 from cosim.campaigns.store.folder import PARTS
+from cosim.campaigns.sweeps.design import vary_from
 from cosim.command_line.cli import main
 from cosim.scenario.scenario import load_scenario
 from tests.cosim.campaigns.fake import Choosy, fakes
