@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -122,7 +121,7 @@ class Record(Rows):
             if (format_number := _format_of(source.schema)) is not None:
                 require_format(file, format_number)
             columns = tuple(map(_column_of, source.schema))
-        self._kept: OrderedDict[str, Array] = OrderedDict()
+        self._kept: dict[str, Array] = {}
         super().__init__(columns, self._kept)
         self._small = self._count * len(columns) <= _SMALL  # reading one signal takes a tenth of the time of all
 
@@ -148,14 +147,13 @@ class Record(Rows):
         return super().stack(names)
 
     def _keep(self, names: Sequence[str]) -> None:
-        """Read signals that are not in memory, in place of those that were not used for the longest time."""
-        for name in filter(self._kept.__contains__, names):
-            self._kept.move_to_end(name)
+        """Read signals that are not in memory, in place of the others if those are many."""
         missing = [name for name in names if name not in self._kept]
+        if missing and not self._small and len(self._kept) + len(missing) > _MAX_CACHED_SIGNALS:
+            for name in self._kept.keys() - names:
+                del self._kept[name]
         if missing:
             columns = self.columns if self._small else self._columns_of(missing)
-            while self._kept and len(self._kept) + len(columns) > _MAX_CACHED_SIGNALS:
-                self._kept.popitem(last=False)
             arrays, first = [np.empty(self._count) for _ in columns], 0
             for batch in self._batches(columns):  # a table of the whole would take the memory twice
                 for row, column in zip(arrays, columns, strict=True):

@@ -13,7 +13,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from cosim.campaigns.analysis.statistics import Facts, bins, quantiles, rate
 from cosim.campaigns.pages.sections import LABELS
 from cosim.campaigns.store.results import Results
-from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, NamedFigure, legend_columns
+from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, NamedFigure
 from cosim.simulation.signals import Array
 
 WIDTH = 5.6  # in, width of a figure, which is readable on a phone too
@@ -24,6 +24,7 @@ _TICKS = 5  # maximum number of intervals across a panel, so that labels of five
 _WIDE = 30.0  # ratio of a logarithmic range from which on only powers of ten have ticks
 _STEPS = 400  # maximum number of steps of a drawn distribution
 _DASHES = ("-", "--", "-.", ":")
+_LETTERS, _MARK = 100, 7  # widths in letters of a legend 6.4 in wide: the legend; a line or marker
 _MAX_SCENES = 1500  # maximum number of scenes that are drawn one by one
 _NEVER = 1.12  # distance of missing numbers from the minimum number, as a multiple of the range of the numbers
 
@@ -219,7 +220,7 @@ def _format_key_axis(axes: Axes, key: Key) -> None:
 def legend_above(figure: Figure, axes: Axes) -> None:
     """Add the legend of a panel above a figure, in as many columns as fit."""
     handles, labels = axes.get_legend_handles_labels()
-    columns = int(legend_columns(labels) * WIDTH / 6.4)  # `legend_columns` is for figures of runs, 6.4 in wide
+    columns = int(_LETTERS // (max(map(len, labels)) + _MARK) * WIDTH / 6.4)
     figure.legend(handles, labels, loc="outside upper center", ncols=max(1, min(columns, len(labels))))
 
 

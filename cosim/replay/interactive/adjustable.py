@@ -4,20 +4,15 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
-from controller import LawError
 from controller.regions.region_set import shape_entry
 from controller.regions.shape import Shape
 from cosim.replay.interactive.flight import Flight
 from cosim.scenario.changes import value_at
 from cosim.scenario.key_names import PARAMETERS, key_name
-from cosim.scenario.law_factory import law_of
-from cosim.scenario.scenario import Scenario
-from cosim.ssp.memory import Memory, arrays_of
+from cosim.ssp.memory import Memory
 
 BUOYANCY = f"{PARAMETERS}buoyancy"
 _STARTS = {**{f"plant.current.{i}": f"current.{axis}" for i, axis in enumerate("xyz")}, BUOYANCY: "buoyancy"}
@@ -25,7 +20,6 @@ _NOISE = ("sensing.position_noise", "sensing.velocity_noise")
 _AXES = {"x": 0, "y": 1, "z": 2, "north": 0, "east": 1}
 _POINTS = ("center", "feature", "point", "middle", "corner")  # packed numbers that are a position
 _DEPTHS = ("top", "bottom", "depth")  # packed numbers that are a depth
-_CHANGES: tuple[Callable[[float], float], ...] = (lambda x: 0.5 * x, lambda x: 2.0 * x + 1.0)
 
 Axes = tuple[tuple[str, ...], ...]  # keys that move a region along each axis
 
@@ -53,8 +47,8 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | 
     if flight.noise.size:
         targets |= {key: ("noise", (i,)) for i, key in enumerate(_NOISE)}
     gains = scenario.law.gains
-    for gain in _gains_used_as_given(scenario, gains._fields, _numbers(scenario, {})):
-        targets[f"law.gains.{gain}"] = "gains", (gains._fields.index(gain),)
+    # a law computes nothing from its gains before its steps
+    targets |= {f"law.gains.{gain}": ("gains", (i,)) for i, gain in enumerate(gains._fields)}
     moves: list[Axes | None] = []
     has_center = shape_entry(scenario.goal).center is not None
     shapes = [("goal", scenario.goal, data.goal, 0)]
@@ -77,32 +71,6 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | 
         name, value = key_name(key, scenario.table, scenario.vehicle), value_at(scenario.table, key, scenario.vehicle)
         slots.append(Slot(key, name.words, name.unit, float(value), *target))
     return slots, moves
-
-
-def _gains_used_as_given(scenario: Scenario, names: tuple[str, ...], numbers: Any) -> list[str]:
-    """Return the gains that a law's function receives as they are, and on which none of its other numbers depends."""
-    # all at once, and by halves only where one of them is not
-
-    def is_independent(change: Callable[[float], float]) -> bool:
-        try:
-            changed = {name: change(getattr(scenario.law.gains, name)) for name in names}
-            return bool(_numbers(scenario, changed) == numbers)
-        except LawError:  # the law refuses a value
-            return len(names) == 1
-
-    if all(map(is_independent, _CHANGES)):
-        return [*names]
-    half = len(names) // 2
-    parts = (names[:half], names[half:]) if half else ()
-    return [name for part in parts for name in _gains_used_as_given(scenario, part, numbers)]
-
-
-def _numbers(scenario: Scenario, changed: dict[str, float]) -> tuple[Any, ...]:
-    """Return how much a law changes each gain that it is given, with some of them changed, and its memory."""
-    gains = scenario.law.gains._replace(**changed)
-    law = law_of(dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, gains=gains)))
-    memory = [(array.shape, array.tobytes()) for array in arrays_of(law.memory)]
-    return [own - given for own, given in zip(law.gains, gains, strict=True)], memory
 
 
 def _positions(path: str, shape: Shape) -> Iterator[tuple[int, int, tuple[str, ...]]]:

@@ -21,7 +21,7 @@ _TAIL = 0.15  # fraction of the axis that shows the time at rest
 
 
 def rests_from(record: Rows) -> float | None:
-    """Return the time from which the vehicle stays at its final pose [s], by the rule of replays."""
+    """Return the time from which the vehicle stays at its final pose [s]."""
     time = record["time"]
     positions = record.stack([f"position.{axis}" for axis in "xyz"])
     turns = record.stack([f"quaternion.e{i}" for i in range(4)])

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.report.figures.panels import overlap_columns, zoom_columns
-from cosim.report.figures.style import POINTS, FigureData
+from cosim.report.figures.style import FigureData
 from cosim.report.figures.time_series import error_of, norms_of, thrusts_of
-from cosim.report.figures.trajectory import POSITION
 from cosim.results.extremes import even_edges, extreme_rows, rows_at
 from cosim.results.record import Rows
 from cosim.results.required_columns import REGION_COLUMNS
@@ -20,8 +19,7 @@ from cosim.simulation.signals import Array
 
 _MAX_WHOLE_ROWS = 200_000  # maximum number of rows of a record that is used as a whole
 _MAX_SAMPLED_ROWS = 80_000  # maximum number of rows with extremes
-_EVEN = 2_000  # number of evenly spaced rows
-_CHANGES = 100  # maximum number of changes by commands in a block of rows; in all a hundred times as many
+_EVEN = 20_000  # number of evenly spaced rows
 _DRAWN = (
     "time", "position.", "quaternion.", "velocity.", "attitude.", "membership.", "weight.", "estimate.", "command.",
     "actuation.", "thruster_force[", "commands.", "target.", "lyapunov.",
@@ -32,8 +30,7 @@ _EXTREME = ("attitude.", "membership.", "weight.", "estimate.", "lyapunov.")
 def make_figure_data(run: Run) -> FigureData:
     """Select the rows from which the figures of a run are drawn."""
     # From a long record, these are the rows with the minimum and maximum of each drawn signal in each of some hundred
-    # parts of the run and of the enlarged spans; rows evenly spaced in time and along the path; and rows at which
-    # commands changed a signal.
+    # parts of the run and of the enlarged spans, and rows evenly spaced in time.
     data = FigureData(run.scenario, run.record, run.summary)
     if len(run.record) <= _MAX_WHOLE_ROWS:
         return data
@@ -53,7 +50,7 @@ def _rows(data: FigureData, names: list[str]) -> NDArray[np.intp]:
     blocks = (_signals_with_extremes(scenario, block) for block in record.blocks(names))
     extremes = extreme_rows(blocks, signals, np.unique(np.concatenate(edges)))
     even = np.linspace(0, n - 1, _EVEN).astype(np.intp)
-    return np.unique(np.concatenate([even, bounds, extremes, _along(record), _commanded(record)]))
+    return np.unique(np.concatenate([even, bounds, extremes]))
 
 
 def _signals_with_extremes(scenario: Scenario, rows: Rows) -> list[Array]:
@@ -62,38 +59,3 @@ def _signals_with_extremes(scenario: Scenario, rows: Rows) -> list[Array]:
     names += [f"actuation.{axis}" for axis in "XYZ"]
     _, error = error_of(scenario, rows)
     return [*(rows[name] for name in names), error, *norms_of(rows).values(), *thrusts_of(scenario, rows).T]
-
-
-def _along(record: Rows) -> NDArray[np.intp]:
-    """Return rows that are evenly spaced along the path of the vehicle."""
-    chunks, total = [], 0.0
-    for count in (0, POINTS):  # the length first
-        marks, first, length, last_length = np.linspace(0.0, total, count), 0, 0.0, -1.0
-        before: Array | None = None
-        for block in record.blocks(POSITION):
-            path = block.stack(POSITION)
-            known = np.flatnonzero(np.isfinite(path).all(axis=1))
-            if known.size:
-                steps = np.diff(path[known], axis=0, prepend=path[known[:1]] if before is None else before)
-                reached = length + np.cumsum(np.linalg.norm(steps, axis=1))
-                due = marks[(marks > last_length) & (marks <= reached[-1])]
-                chunks.append(first + known[np.searchsorted(reached, due)])
-                length = last_length = float(reached[-1])
-                before = path[known[-1:]]
-            first += len(block)
-        total = length
-    return np.concatenate([np.empty(0, np.intp), *chunks])
-
-
-def _commanded(record: Rows) -> NDArray[np.intp]:
-    """Return the rows at which commands changed a signal, and the rows before them; thinned if there are many."""
-    names = [name for name in record.units if name.startswith(("commands.", "target."))]
-    rows_of_blocks, first, before = [np.empty(0, np.intp)], 0, np.full((1, len(names)), np.nan)
-    for block in record.blocks(names) if names else ():
-        block_rows = block.to_array()
-        changed = np.flatnonzero((np.diff(block_rows, axis=0, prepend=before) != 0.0).any(axis=1))
-        rows_of_blocks.append(first + changed[:: max(1, len(changed) // _CHANGES)])
-        first, before = first + len(block_rows), block_rows[-1:]
-    rows = np.concatenate(rows_of_blocks)
-    rows = rows[:: max(1, len(rows) // (100 * _CHANGES))]
-    return np.concatenate([rows, np.maximum(rows - 1, 0)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -41,7 +41,6 @@ STYLE: Any = {
 
 DPI = 160  # resolution of figures as PNG
 
-_LEGEND_WIDTH, _LEGEND_MARK = 100, 7  # widths in letters: width of a figure; width of a line or marker
 POINTS = 1000  # number of points of a drawn curve, about the resolution of a figure's width
 
 
@@ -136,8 +135,3 @@ def shifts_of(record: Rows, name: str) -> Array:
     if f"{name}.shift.x" not in record.units:
         return np.zeros((len(record), 3))
     return record.stack([f"{name}.shift.{axis}" for axis in "xyz"])
-
-
-def legend_columns(labels: Iterable[str]) -> int:
-    """Return the number of columns of a legend across a figure, all as wide as the longest label."""
-    return max(1, _LEGEND_WIDTH // (max(map(len, labels)) + _LEGEND_MARK))

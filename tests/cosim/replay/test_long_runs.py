@@ -88,11 +88,11 @@ def test_streamed_excerpt_is_identical(every, rate, docking, streamed):
 @pytest.mark.parametrize("name", RUNS)
 def test_figures_of_a_long_run_are_thinned_and_keep_extremes(name, run_of, streamed, monkeypatch):
     monkeypatch.setattr("cosim.report.figures.sampled_rows._MAX_SAMPLED_ROWS", 2000)
-    monkeypatch.setattr("cosim.report.figures.sampled_rows._EVEN", 50)
+    monkeypatch.setattr("cosim.report.figures.sampled_rows._EVEN", 1000)
     run = run_of(name)
     story = make_figure_data(streamed(run))
     n, drawn = len(run.record), story.record
-    assert len(drawn) <= 2000 + 50 + 1000 + 200 or len(drawn) == n
+    assert len(drawn) <= 2000 + 1000 or len(drawn) == n
     at = np.searchsorted(run.record["time"], drawn["time"])
     assert at[0] == 0 and at[-1] == n - 1
     told = [n for n in drawn.units if n.startswith(("attitude.", "weight.", "lyapunov.")) or n.endswith(".clearance")]

@@ -9,7 +9,7 @@ from matplotlib.text import Text
 
 from cosim.report.figures.axes_box import Box
 from cosim.report.figures.figures import drawings
-from cosim.report.figures.style import FigureData, features_of, legend_columns, region_instances, shifts_of
+from cosim.report.figures.style import FigureData, features_of, region_instances, shifts_of
 from cosim.results.record import load_record
 from cosim.results.wording import verdict
 from cosim.run.run_scenario import run_scenario
@@ -149,8 +149,3 @@ def test_verdict_gives_angles_in_degrees(inspection):
     )
     assert inspection.summary["clearance_unit"] == {"view": "rad", "pipe": "m", "sea bed": "m"}
     assert inspection.summary["hard"] == ["pipe", "sea bed"]
-
-
-@pytest.mark.parametrize(("longest", "columns"), [(1, 12), (13, 5), (93, 1), (200, 1)])
-def test_legends_fit_the_figure(longest, columns):
-    assert legend_columns(["x", "x" * longest]) == columns
