@@ -23,14 +23,8 @@ from hatchling import build
 from hatchling.build import *  # noqa: F403 the functions of PEP 517
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-_NEEDED = (
-    "fmpy",
-    "msgspec",
-    "numpy",
-    "platformdirs",
-    "scipy",
-    "tomli-w",
-)  # of the dependencies, by what writes the libraries
+# dependencies needed to compile the libraries
+_BUILD_REQUIREMENTS = ("fmpy", "msgspec", "numpy", "platformdirs", "scipy", "tomli-w")
 _COMPILE = """
 import pathlib, sys
 from plant_fmu.compiling.prebuilt import shipped_structures, write_prebuilt
@@ -53,35 +47,35 @@ class PrebuiltLibraries(BuildHookInterface):  # type: ignore[type-arg]
 
     def dependencies(self) -> list[str]:
         """Return what the build needs: what the package itself imports for the work, and a compiler."""
-        if self._is_there():
+        if self._is_unpacked_sdist():
             return []
         core = self.metadata.core
-        needed = [text for text in core.dependencies if text.startswith(_NEEDED)]
+        needed = [text for text in core.dependencies if text.startswith(_BUILD_REQUIREMENTS)]
         has_compiler = os.environ.get("CC") or shutil.which("cc")
-        return needed if has_compiler and self._for_this_machine() else [*needed, *core.optional_dependencies["build"]]
+        return needed if has_compiler and self._builds_wheel() else [*needed, *core.optional_dependencies["build"]]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile the libraries, unless this is an editable installation or they are there."""
-        if version == "editable" or self._is_there():
+        if version == "editable" or self._is_unpacked_sdist():
             return
         self._folder = tempfile.TemporaryDirectory(prefix="subreach-")
         folder = self._folder.name
-        platforms = "native" if self._for_this_machine() else "all"
+        platforms = "native" if self._builds_wheel() else "all"
         subprocess.run([sys.executable, "-c", _COMPILE, platforms, folder], cwd=self.root, check=True)  # noqa: S603 - our own code
         for file in sorted(file for file in Path(folder).rglob("*") if file.is_file()):
             build_data["force_include"][str(file)] = file.relative_to(folder).as_posix()
-        if self._for_this_machine():
+        if self._builds_wheel():
             build_data |= {"pure_python": False, "infer_tag": True}
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
-        """Leave nothing behind."""
+        """Remove the temporary folder."""
         if self._folder is not None:
             self._folder.cleanup()
 
-    def _is_there(self) -> bool:
-        return (Path(self.root) / "PKG-INFO").is_file()  # an unpacked source distribution
+    def _is_unpacked_sdist(self) -> bool:
+        return (Path(self.root) / "PKG-INFO").is_file()
 
-    def _for_this_machine(self) -> bool:
+    def _builds_wheel(self) -> bool:
         return bool(self.target_name == "wheel")
 
 

@@ -141,13 +141,7 @@ def _autopilot(parser: argparse.ArgumentParser, options: argparse.Namespace) -> 
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the verb of the command line.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Command-line arguments; default: those of the process.
-    """
+    """Run the verb of the command line."""
     parser = _parser()
     options = parser.parse_args(arguments)
     match options.name:

@@ -126,26 +126,7 @@ def outcome(scores: Iterable[Score]) -> Outcome:
 
 
 def draws(law: str, count: int, rng: np.random.Generator, best: Any = None, near: float = math.inf) -> list[Any]:
-    """Draw gains of a law.
-
-    Parameters
-    ----------
-    law : str
-        One of `RANGES`.
-    count : int
-        Number of draws.
-    rng : Generator
-        Source of the random numbers.
-    best : NamedTuple, optional
-        Gains to draw around.
-    near : float
-        Greatest factor between a drawn gain and that of `best`, up or down; the ranges apply as well.
-
-    Returns
-    -------
-    list of NamedTuple
-        Gains of the law, to four figures.
-    """
+    """Draw gains of a law to four figures, within its ranges and a factor `near` of the gains `best`."""
     return [draw_gains(LAWS[law].gains_type, RANGES[law], rng, best, near) for _ in range(count)]
 
 
@@ -167,26 +148,7 @@ def draw_gains(
 
 
 def search(law: str, count: int, seed: int, workers: int, pd: PdGains | None = None) -> Candidate:
-    """Search for the best gains of a law.
-
-    Parameters
-    ----------
-    law : str
-        One of `RANGES`.
-    count : int
-        Number of draws, 1 or more.
-    seed : int
-        Seed of the draws.
-    workers : int
-        Number of processes; it does not change the result.
-    pd : PdGains, optional
-        Gains of `pd` for the law's first batch, see `FROM_PD`; default: the defaults of `pd`.
-
-    Returns
-    -------
-    Candidate
-        Best gains, and their scores over all scenes, each of duration `DURATION`.
-    """
+    """Search for the best gains of a law; `pd` has those for its first batch, see `FROM_PD`."""
     rng = np.random.default_rng(seed)
     (size, _), *batches = _batches(count)
     known = {name: getattr(pd or PdGains(), name) for name in FROM_PD[law]}
@@ -207,11 +169,11 @@ def search(law: str, count: int, seed: int, workers: int, pd: PdGains | None = N
 
 def _batches(count: int) -> list[tuple[int, float]]:
     """Return the size of each batch, and the greatest factor between its draws and the best."""
-    found = []
+    batches = []
     for share, near in PHASES:
         phase = math.ceil(share * count)
-        found += [(min(BATCH, phase - done), near) for done in range(0, phase, BATCH)]
-    return found
+        batches += [(min(BATCH, phase - done), near) for done in range(0, phase, BATCH)]
+    return batches
 
 
 def _race(job: tuple[str, Any, Candidate]) -> Candidate:
@@ -225,25 +187,7 @@ def race(
     fly_on: Callable[[Candidate, Iterable[int]], Candidate],
     heats: Sequence[tuple[int, float]],
 ) -> Candidate:
-    """Fly gains until they fall behind the best.
-
-    Parameters
-    ----------
-    gains : NamedTuple
-        Gains to fly.
-    best : Candidate
-        Best gains so far, flown in all scenes.
-    fly_on : callable
-        Function that flies a candidate in further scenes.
-    heats : sequence of (int, float)
-        For each heat: number of scenes flown by its end, in addition to those in which the best fails, and greatest
-        allowed ratio of the median reach time to that of the best. All scenes are flown by the end of the last heat.
-
-    Returns
-    -------
-    Candidate
-        Gains with their scores, in all scenes or in those until they fell behind.
-    """
+    """Fly gains until they fall behind the best in a heat: number of scenes, greatest ratio of reach times."""
     failures = best.failures
     order = failures + [i for i in range(heats[-1][0]) if i not in failures]
     candidate = Candidate(gains, {})
@@ -274,28 +218,16 @@ def _scene(index: int) -> Scene:
     return msgspec.convert(make_scene(FIRST_SEED + index // len(KINDS), KINDS[index % len(KINDS)]), Scene)
 
 
-def format_outcome(found: Outcome) -> str:
+def format_outcome(outcome: Outcome) -> str:
     """Format an outcome as one line."""
     return (
-        f"{found.violations} violations and {found.reached} reached of {found.scenes} scenes; "
-        f"medians over those reached without violation: {found.reach_time:.2f} s, {found.effort:.0f} N s"
+        f"{outcome.violations} violations and {outcome.reached} reached of {outcome.scenes} scenes; "
+        f"medians over those reached without violation: {outcome.reach_time:.2f} s, {outcome.effort:.0f} N s"
     )
 
 
 def main(laws: Iterable[str], count: int, seed: int, workers: int) -> None:
-    """Search for the gains of some laws, print them, and fly all scenes with them.
-
-    Parameters
-    ----------
-    laws : iterable of str
-        Names of laws in `RANGES`.
-    count : int
-        Number of draws for each law; 0 to fly the default gains without a search.
-    seed : int
-        Seed of the draws.
-    workers : int
-        Number of processes.
-    """
+    """Search for the gains of some laws, print them, and fly all scenes with them; no search for a count of 0."""
     pd = PdGains()
     for law in laws:
         gains = LAWS[law].gains_type()
@@ -306,5 +238,5 @@ def main(laws: Iterable[str], count: int, seed: int, workers: int) -> None:
                 print(f"  {name} = {getattr(gains, name):.4g}")
         flown = _fly_on((law, Candidate(gains, {}), range(SCENES), Conditions().duration)).scores
         for first, kind in enumerate(KINDS):
-            found = outcome(flown[i] for i in range(first, SCENES, len(KINDS)))
-            print(f"{law}, {kind}, in full: {format_outcome(found)}", flush=True)
+            result = outcome(flown[i] for i in range(first, SCENES, len(KINDS)))
+            print(f"{law}, {kind}, in full: {format_outcome(result)}", flush=True)

@@ -40,10 +40,10 @@ class _FmuInstance:
         self.fmu: Any = instantiate_fmu(self.folder, description, "CoSimulation")
         variables = description.modelVariables
         self.references = {v.name: v.valueReference for v in variables}
-        found: dict[tuple[bool, str], list[int]] = {}
+        references: dict[tuple[bool, str], list[int]] = {}
         for v in variables:
-            found.setdefault((v.type == "Boolean", v.causality), []).append(v.valueReference)
-        self.groups = [found[False, "input"], found[False, "output"], found[True, "output"]]
+            references.setdefault((v.type == "Boolean", v.causality), []).append(v.valueReference)
+        self.groups = [references[False, "input"], references[False, "output"], references[True, "output"]]
 
     def get(self, references: list[int]) -> list[float]:
         values: list[float] = (self.fmu.getReal if self.fmi == 2 else self.fmu.getFloat64)(references)
@@ -86,19 +86,7 @@ def _compile(folder: Path) -> ctypes.CDLL:
 def c_loop(
     path: Path, start: dict[str, float], step: float, *, step_only: bool = False
 ) -> Iterator[Callable[[int], None]]:
-    """Yield a function that runs a given number of steps in C.
-
-    Parameters
-    ----------
-    path : Path
-        Path of an FMU with real inputs, and real and Boolean outputs.
-    start : dict from str to float
-        Start values by names of variables, in SI units.
-    step : float
-        Communication step [s].
-    step_only : bool
-        True to set no inputs and read no outputs.
-    """
+    """Yield a function that runs a number of steps [s] in C, with all inputs and outputs, or `step_only`."""
     with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch, _instance(path) as instance:
         loop = _compile(Path(scratch))
         instance.initialize(start)

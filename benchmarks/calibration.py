@@ -57,22 +57,7 @@ class _Overlap:
 
 
 def window(scenario: Scenario, force: float, time_constant: float) -> tuple[float, float]:
-    """Return the times [s] at which the vehicle enters and leaves the overlap with a limit and a lag.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario; its limit is replaced.
-    force : float
-        Limit on the body force [N].
-    time_constant : float
-        Lag behind the limit [s].
-
-    Returns
-    -------
-    (float, float)
-        Entry and exit [s], interpolated between steps; NaN for one that does not happen in the first 6 s.
-    """
+    """Return the times at which the vehicle enters and leaves the overlap [s], NaN for never; force [N], lag [s]."""
     step = scenario.time.step
     steps = round(_DURATION / step)
     limited = dataclasses.replace(
@@ -89,23 +74,7 @@ def window(scenario: Scenario, force: float, time_constant: float) -> tuple[floa
 
 
 def calibrate(scenario: Scenario) -> Fit:
-    """Fit limit and lag to the paper's window.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario, usually ``paper``.
-
-    Returns
-    -------
-    Fit
-        The best point of a grid, refined by least squares.
-
-    Raises
-    ------
-    ScenarioError
-        If the scenario names no regions that overlap, its path misses them, or it drives thrusters.
-    """
+    """Fit limit and lag to the paper's window."""
     if scenario.actuation.through != "wrench":
         raise ScenarioError(
             "actuation.through is 'thrusters', expected 'wrench': limit and lag are of the direct force"
@@ -114,8 +83,8 @@ def calibrate(scenario: Scenario) -> Fit:
         raise ScenarioError("intersection: names no regions, expected those whose overlap is to be fitted")
 
     def residuals(x: Array) -> Array:
-        found = np.array(window(scenario, math.exp(x[0]), x[1])) - PAPER_WINDOW
-        return np.where(np.isnan(found), _MISSED, found)
+        errors = np.array(window(scenario, math.exp(x[0]), x[1])) - PAPER_WINDOW
+        return np.where(np.isnan(errors), _MISSED, errors)
 
     starts = [
         np.array([x, y])

@@ -15,29 +15,15 @@ Entry = Callable[[ExitStack], Contestant]  # makes a contestant; the stack close
 
 @dataclass(frozen=True)
 class Contest:
-    """Contestants that are timed together.
+    """Contestants that are timed together."""
 
-    Attributes
-    ----------
-    title : str
-        Description of an item.
-    ours, peers : mapping from str to Entry
-        Entries by their names in the table.
-    pairs : tuple of (str, str), optional
-        Pairs of this project's entry and a peer, "" for none; default: each with each.
-    count, repeats : int, optional
-        Items per repeat, and greatest number of repeats, if the items are long.
-    pinned : bool
-        True to keep all on one processor; False if an item is the work of several processes.
-    """
-
-    title: str
-    ours: Mapping[str, Entry]
+    title: str  # description of an item
+    ours: Mapping[str, Entry]  # entries by their names in the table
     peers: Mapping[str, Entry] = field(default_factory=dict)
-    pairs: tuple[tuple[str, str], ...] = ()
-    count: int | None = None
-    repeats: int | None = None
-    pinned: bool = True
+    pairs: tuple[tuple[str, str], ...] = ()  # this project's entry and a peer, "" for none; empty: each with each
+    count: int | None = None  # items per repeat, if they are long
+    repeats: int | None = None  # greatest number of repeats, if the items are long
+    pinned: bool = True  # on one processor; False if an item is the work of several processes
 
     def measure(self, budget: float, repeats: int) -> Table:
         """Time all contestants, and return a row for each pair: the ratio of a peer's time to this project's."""
@@ -56,7 +42,7 @@ class Contest:
 def _row(our: str, peer: str, timings: Mapping[str, Timing | str]) -> Row:
     if not peer:
         return Row(our, timings[our])
-    return Row(our, timings[our], peer, timings[peer], duel=True)
+    return Row(our, timings[our], peer, timings[peer], is_paired=True)
 
 
 def entered(entry: Entry, stack: ExitStack) -> Contestant | str:

@@ -22,24 +22,7 @@ SUBJECTS: dict[str, Callable[[Environment], Iterator[Contest]]] = {
 
 
 def measure(subjects: list[str], budget: float, repeats: int, environment: Environment) -> list[Table]:
-    """Run the contests.
-
-    Parameters
-    ----------
-    subjects : list of str
-        Names of subjects in `SUBJECTS`.
-    budget : float
-        Time of a repeat of each contestant [s].
-    repeats : int
-        Number of repeats.
-    environment : Environment
-        Environment of the peers.
-
-    Returns
-    -------
-    list of Table
-        A table for each contest.
-    """
+    """Run the contests of some subjects; budget [s] of a repeat."""
     tables = []
     for subject in subjects:
         for contest in SUBJECTS[subject](environment):

@@ -10,7 +10,7 @@ from typing import Any
 
 from benchmarks.c_loop import c_loop
 from benchmarks.peers import fmpy_steps
-from benchmarks.table import Row, compared
+from benchmarks.table import Row, with_base
 from benchmarks.timing import Timing, time_batches, time_calls
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
@@ -23,18 +23,7 @@ _SLOWER = 50  # divisor of the steps of slower contestants
 
 
 def measure(steps: int, repeats: int) -> list[Row]:
-    """Time the ways to step one FMU; each sets all inputs and reads all outputs, unless it only steps.
-
-    Parameters
-    ----------
-    steps, repeats : int
-        Steps per repeat, and number of repeats.
-
-    Returns
-    -------
-    list of Row
-        Rows with ratios to the loop in C over the same FMU.
-    """
+    """Time the ways to step one FMU; each sets all inputs and reads all outputs, unless it only steps."""
     rows: list[Row] = []
     for fmi in (3, 2):
         path, timings = cached_fmu(load_vehicle("odin"), fmi), dict[str, Timing | str]()
@@ -48,7 +37,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
                 timings[f"FMI {fmi}: FMPy, {name}"] = _fmpy(made, path, folder, steps, repeats)
         if fmi == 2:
             timings["FMI 2: pythonfmu, NumPy"] = _pythonfmu(max(1, steps // _SLOWER), repeats)
-        rows += compared(timings)
+        rows += with_base(timings)
     return rows
 
 
@@ -82,18 +71,7 @@ def _pythonfmu(steps: int, repeats: int) -> Timing | str:
 
 
 def export_numpy_plant(folder: Path) -> Path | None:
-    """Export the plant in NumPy with pythonfmu.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder for the FMU.
-
-    Returns
-    -------
-    Path, optional
-        Path of the FMU; None if pythonfmu is not installed.
-    """
+    """Export the plant in NumPy with pythonfmu; return None if that is not installed."""
     if importlib.util.find_spec("pythonfmu") is None:
         return None
     from pythonfmu.builder import FmuBuilder

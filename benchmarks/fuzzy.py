@@ -20,8 +20,8 @@ from benchmarks.peer_environment import Environment, installed_python
 from benchmarks.peer_process import peer
 from benchmarks.peers import skfuzzy_rules
 from benchmarks.peers.fuzzy_libraries import LIBRARIES
-from benchmarks.table import Row, compared
-from benchmarks.timing import Own, Timing, time_batches, time_calls, timed
+from benchmarks.table import Row, with_base
+from benchmarks.timing import InProcess, Timing, time_batches, time_calls, time_contestant
 from fuzzy_arbiter import Arbiter, Output, System, Variable, auto_terms, curve, triangle
 from fuzzy_arbiter.criteria import SECTION_VI, Criterion
 from fuzzy_arbiter.definition import Defuzzifier
@@ -46,18 +46,7 @@ _OTHER_TIPPING: dict[str, dict[str, Any]] = {
 
 
 def measure(steps: int, repeats: int) -> list[Row]:
-    """Time evaluations of the paper's rules, with new inputs at each.
-
-    Parameters
-    ----------
-    steps, repeats : int
-        Evaluations per repeat, and number of repeats; a batch has five times as many rows.
-
-    Returns
-    -------
-    list of Row
-        Rows with ratios to scikit-fuzzy.
-    """
+    """Time evaluations of the paper's rules, with new inputs at each; a batch has five times as many rows."""
     timings: dict[str, Timing | str] = {}
     add, few = timings.__setitem__, max(1, steps // _SLOWER)
     add(f"scikit-fuzzy, stock, {POINTS} points", _stock(skfuzzy_rules.calls, few, repeats))
@@ -91,7 +80,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
     for system in ("section_vi", "tipping"):
         add(f"batch of {len(batch)}: pyfuzzylite, resolution 100, {system}", _other_batch(system, len(batch), repeats))
     add("building: 40 criteria", time_calls(lambda: Arbiter(criteria), max(1, few // 10), repeats))
-    return compared(timings)
+    return with_base(timings)
 
 
 def interpreter(library: str) -> str | None:
@@ -103,8 +92,8 @@ def interpreter(library: str) -> str | None:
     other = os.environ.get(OTHER_PYTHON)
     if other is None:
         return None
-    found = subprocess.run([other, "-c", f"import {_MODULES[library]}"], capture_output=True, check=False)
-    return other if found.returncode == 0 else None
+    done = subprocess.run([other, "-c", f"import {_MODULES[library]}"], capture_output=True, check=False)
+    return other if done.returncode == 0 else None
 
 
 def ask(python: str, **request: Any) -> dict[str, Any]:
@@ -121,7 +110,7 @@ def _other(library: str, evaluations: int, repeats: int) -> Timing | str:
         return f"{library} is not installed"
     setup = {"library": library, "system": "section_vi", "resolution": 100}
     with peer(Environment(python), library, "fuzzy_libraries", "evaluations", setup) as contestant:
-        return timed(contestant, evaluations, repeats)
+        return time_contestant(contestant, evaluations, repeats)
 
 
 def _other_batch(system: str, rows: int, repeats: int) -> Timing | str:
@@ -130,7 +119,7 @@ def _other_batch(system: str, rows: int, repeats: int) -> Timing | str:
         return "pyfuzzylite is not installed"
     setup = {"system": system, "resolution": 100}
     with peer(Environment(python), "pyfuzzylite", "fuzzy_libraries", "batches", setup) as contestant:
-        return timed(contestant, rows, repeats)
+        return time_contestant(contestant, rows, repeats)
 
 
 def _general() -> Arbiter:
@@ -175,7 +164,7 @@ def _looped(arbiter: Arbiter, rows: np.ndarray[Any, np.dtype[np.float64]], repea
 def _stock(function: Callable[[dict[str, Any]], Callable[[int], object]], count: int, repeats: int) -> Timing:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
-        return timed(Own(function({"points": POINTS})), count, repeats)
+        return time_contestant(InProcess(function({"points": POINTS})), count, repeats)
 
 
 def _calls(arbiter: Arbiter, calls: int, repeats: int, form: Callable[[list[float]], Any] | None = list) -> Timing:

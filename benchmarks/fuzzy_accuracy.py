@@ -113,13 +113,7 @@ def _random_shape(rng: np.random.Generator, low: float, width: float) -> Members
 
 
 class Reference:
-    """The joined terms of a case on cells, divided until two rules of quadrature agree on each.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-    """
+    """The joined terms of a case on cells, divided until two rules of quadrature agree on each."""
 
     def __init__(self, case: Case) -> None:
         output = case.output
@@ -240,12 +234,12 @@ def errors(case: Case) -> tuple[float, str]:
 
 def print_worst(systems: int, seed: int) -> None:
     """Print the worst error of each defuzzifier over random systems, and how many are beyond the bound."""
-    found: dict[str, list[float]] = {name: [] for name in DEFUZZIFIERS}
+    errors: dict[str, list[float]] = {name: [] for name in DEFUZZIFIERS}
     for case in random_cases(systems, seed):
         error, _ = errors(case)
-        found[case.output.defuzzifier].append(error)
+        errors[case.output.defuzzifier].append(error)
     print(f"{'defuzzifier':12} {'systems':>8} {'without area':>13} {'worst error':>12} {f'beyond {BOUND:g}':>13}")
-    for name, values in found.items():
+    for name, values in errors.items():
         known: Any = np.array(values)
         empty = int(np.isnan(known).sum())
         worst = float(np.nanmax(known)) if empty < len(known) else 0.0

@@ -14,20 +14,8 @@ _PREPARED = 4096  # number of datagrams that a flood repeats, since making them 
 
 
 def hostile_datagrams(count: int, seed: int) -> Iterator[bytes]:
-    """Yield random, truncated, bit-flipped, wrongly long and unsolicited frames in turn.
-
-    Parameters
-    ----------
-    count : int
-        Number of datagrams.
-    seed : int
-        Seed of the random numbers.
-
-    Yields
-    ------
-    bytes
-        A datagram. One in five is a valid request for all parameters, each from another sender.
-    """
+    """Yield random, truncated, bit-flipped, wrongly long and unsolicited frames in turn."""
+    # one in five is a valid request for all parameters, each from another sender
     rng, mavlink = random.Random(seed), dialect()
     codec = mavlink.MAVLink(None, 255, 190)
     good = [message.pack(codec) for message in _good_messages(mavlink, rng)]

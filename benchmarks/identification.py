@@ -78,17 +78,7 @@ def draw_truth(parameters: list[Parameter], vehicle: Vehicle, rng: np.random.Gen
 
 
 class Disturbed:
-    """A plant with unmodeled effects: a random force, and factors on the thrusters' forces.
-
-    Parameters
-    ----------
-    plant : Plant
-        Plant of the vehicle.
-    force : ndarray, shape (steps, 6)
-        Wrench to add in each step [N, N m], body frame; the last row holds from then on.
-    forward, backward : ndarray, shape (thrusters,)
-        Factors on positive and on negative forces.
-    """
+    """A plant with factors on forces forward and backward, and a wrench (steps, 6) [N, N m] added in each step."""
 
     def __init__(self, plant: Plant, force: Array, forward: Array, backward: Array) -> None:
         self._plant, self._force, self._factors, self._k = plant, force, (forward, backward), 0
@@ -106,18 +96,15 @@ class Disturbed:
 
 
 def random_force(steps: int, rng: np.random.Generator) -> Array:
-    """Draw a random force along the body axes as a wrench of each step, shape (steps, 6) [N, N m].
-
-    Its standard deviation is 0.2 to 0.5 N, its correlation time 5 to 10 s.
-    """
-    found = np.zeros((steps, 6))
+    """Draw a force of 0.2 to 0.5 N with a correlation time of 5 to 10 s, as wrenches (steps, 6) [N, N m]."""
+    wrenches = np.zeros((steps, 6))
     keep = np.exp(-ROW / rng.uniform(5.0, 10.0))
     size = rng.uniform(0.2, 0.5)
     for axis in range(3):
-        found[:, axis] = lfilter(
+        wrenches[:, axis] = lfilter(
             [size * np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(steps), zi=[size * rng.standard_normal()]
         )[0]
-    return found
+    return wrenches
 
 
 def dive(duration: float) -> list[tuple[int, Command]]:
@@ -143,8 +130,8 @@ def fly(scenario: Scenario, commands: Any, nuisance: str, noise: float, rng: np.
     states, times = flown.states, flown.times
 
     def noisy(values: Array, deviation: float) -> Array:
-        found: Array = values + deviation * noise * rng.standard_normal(values.shape)
-        return found
+        measured: Array = values + deviation * noise * rng.standard_normal(values.shape)
+        return measured
 
     turned: Array = np.array([
         multiply(q, from_axis_angle(a / np.linalg.norm(a), float(np.linalg.norm(a))))
@@ -164,14 +151,14 @@ def fly(scenario: Scenario, commands: Any, nuisance: str, noise: float, rng: np.
     return Log("simulated", times, flown.thrust, np.zeros((len(times), 6)), topics), float(gone)
 
 
-def relative_errors(parameters: list[Parameter], truth: Array, found: Array) -> dict[str, list[float]]:
+def relative_errors(parameters: list[Parameter], truth: Array, estimate: Array) -> dict[str, list[float]]:
     """Return magnitudes of errors by group of parameters: relative, but in SI units for buoyancy and its center.
 
     Errors of off-diagonal added mass are relative to the geometric mean of its diagonal elements.
     """
     diagonal = {int(p.name.split(".")[2]): x for p, x in zip(parameters, truth, strict=True) if _is_diagonal(p)}
     groups: dict[str, list[float]] = {}
-    for p, x, y in zip(parameters, truth, found, strict=True):
+    for p, x, y in zip(parameters, truth, estimate, strict=True):
         key, *place = p.name.split(".")[1:]
         error = abs(y - x)
         if key == "added_mass" and not _is_diagonal(p):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.table import Row, compared
+from benchmarks.table import Row, with_base
 from benchmarks.timing import Timing
 from controller import LAWS, VehicleState
 from controller.compiling.function import BoundCall
@@ -61,15 +61,7 @@ def _steps(track: _Track, law: int, words: int, work: Any, clock: Any, times: An
 
 
 class LawSteps:
-    """A contestant: steps of a law on a flight straight at the obstacles, past them and back again, in process time.
-
-    Parameters
-    ----------
-    law : str
-        Name of a law in `controller.LAWS`.
-    obstacles : int
-        Number of obstacles on the path.
-    """
+    """A contestant: steps of a law on a flight straight at the obstacles, past them and back again, in process time."""
 
     def __init__(self, law: str, obstacles: int) -> None:
         self._vehicle, self._scenery = vehicle_model(load_vehicle("odin")), _scenery(obstacles)
@@ -107,24 +99,13 @@ def _process_clock() -> Any:
 
 
 def measure(steps: int, repeats: int) -> list[Row]:
-    """Time each step of each law on its own, in process time.
-
-    Parameters
-    ----------
-    steps, repeats : int
-        Steps per repeat, and number of repeats; each repeat restarts the law.
-
-    Returns
-    -------
-    list of Row
-        Rows with the times of all steps, and ratios to the paper's law.
-    """
+    """Time each step of each law on its own, in process time."""
     rows = []
     for obstacles in OBSTACLES:
         timings: dict[str, Timing | str] = {}
         for law in sorted(LAWS, key=lambda name: name != "ismail_dunnigan"):
             contestant = LawSteps(law, obstacles)
-            found = [contestant.each(steps) for _ in range(repeats + 1)][1:]  # the first warms the caches
-            timings[f"{law}, {obstacles} obstacles"] = Timing(tuple(np.concatenate(found).tolist()))
-        rows += compared(timings)
+            samples = [contestant.each(steps) for _ in range(repeats + 1)][1:]  # the first warms the caches
+            timings[f"{law}, {obstacles} obstacles"] = Timing(tuple(np.concatenate(samples).tolist()))
+        rows += with_base(timings)
     return rows

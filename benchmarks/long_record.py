@@ -45,17 +45,7 @@ class Taken:
 
 
 def write_long_run(folder: Path, rows: int, scenario: str = SCENARIO) -> None:
-    """Write the folder of a long run: the rows of a short run repeated, with increasing times.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder to make; it must not exist.
-    rows : int
-        Number of rows of the record.
-    scenario : str
-        Name of the scenario whose rows are repeated.
-    """
+    """Write the folder of a long run: the rows of a short run repeated, with increasing times."""
     step = load_scenario(scenario).time.step
     lasting = [f"time.duration={(rows - 1) * step!r}", "arbiter.engine=closed"]
     whole = load_scenario(scenario, lasting)
@@ -77,28 +67,16 @@ def write_long_run(folder: Path, rows: int, scenario: str = SCENARIO) -> None:
 
 
 def print_table(rows: Sequence[int], work: Sequence[str], scenario: str, folder: Path | None) -> None:
-    """Measure verbs on runs of given lengths, and print a line for each verb.
-
-    Parameters
-    ----------
-    rows : sequence of int
-        Number of rows of each run.
-    work : sequence of str
-        Names of verbs in `WORK`.
-    scenario : str
-        Name of the scenario whose rows are repeated.
-    folder : Path or None
-        Folder of the runs and the verbs' output; None for the folder of temporary files.
-    """
-    found = []
+    """Measure verbs on runs of given lengths, and print a line for each verb."""
+    columns = []
     for n in rows:
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
             run = Path(scratch) / "run"
             written = _taken("write", run, n, scenario)
-            found.append([written if name == "record" else _of(name, run, Path(scratch)) for name in work])
+            columns.append([written if name == "record" else _of(name, run, Path(scratch)) for name in work])
     print("peak of the memory of the whole process, and what the work took")
     print(f"{'rows':24}" + "".join(f"{n:>20,}" for n in rows) + ("     ratio" if len(rows) > 1 else ""))
-    for name, *taken in zip(work, *found, strict=True):
+    for name, *taken in zip(work, *columns, strict=True):
         shown = "".join(f"{t.error or f'{t.peak:.0f} MB {t.seconds:6.1f} s':>20}" for t in taken)
         whole = len(taken) > 1 and not any(t.error for t in taken)
         print(f"{name:24}{shown}" + (f"{taken[-1].peak / taken[0].peak:9.2f}x" if whole else ""))

@@ -19,10 +19,10 @@ def processor() -> str:
     with contextlib.suppress(OSError):
         lines = Path("/proc/cpuinfo").read_text().splitlines()
         entries = dict(line.split(":", 1) for line in lines if ":" in line)
-        found = {key.strip(): value.strip() for key, value in entries.items()}
-        name = found.get("model name", name)
-        if "cpu family" in found:
-            name += f" (family {found['cpu family']}, model {found['model']})"
+        info = {key.strip(): value.strip() for key, value in entries.items()}
+        name = info.get("model name", name)
+        if "cpu family" in info:
+            name += f" (family {info['cpu family']}, model {info['model']})"
     return f"{name}, {os.cpu_count()} processors"
 
 
@@ -36,11 +36,11 @@ def load() -> float:
 
 def versions() -> str:
     """Return the versions of Python and of the packages that this project uses."""
-    found = [f"Python {platform.python_version()}"]
+    versions = [f"Python {platform.python_version()}"]
     for package in _PACKAGES:
         with contextlib.suppress(metadata.PackageNotFoundError):
-            found.append(f"{package} {metadata.version(package)}")
-    return ", ".join(found)
+            versions.append(f"{package} {metadata.version(package)}")
+    return ", ".join(versions)
 
 
 def description(repeats: int) -> list[str]:

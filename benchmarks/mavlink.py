@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks import sitl
 from benchmarks.hostile import hostile_datagrams
-from benchmarks.table import Row, compared
+from benchmarks.table import Row, with_base
 from benchmarks.timing import Timing, time_calls
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
 from cosim.mavlink.messages.message_table import message_specs
@@ -44,13 +44,7 @@ _PACE = 1000.0  # steps/s, rate of the scenario in real time
 
 
 class Seventeen:
-    """A vehicle that sends seventeen of its messages at 50 Hz of the wall clock, independent of the run's speed.
-
-    Parameters
-    ----------
-    master : Master
-        Master of the run.
-    """
+    """A vehicle that sends seventeen of its messages at 50 Hz of the wall clock, independent of the run's speed."""
 
     def __init__(self, master: Master) -> None:
         self._context = VehicleContext(master.scenario, master.signals.columns, MavlinkOptions(), None)
@@ -89,20 +83,7 @@ class Seventeen:
 
 
 def measure(steps: int, repeats: int, datagrams: int | None = None) -> list[Row]:
-    """Time messages, steps beside them, and steps under a flood.
-
-    Parameters
-    ----------
-    steps, repeats : int
-        Steps per repeat, and number of repeats.
-    datagrams : int, optional
-        Hostile datagrams per flood; default: ten per step.
-
-    Returns
-    -------
-    list of Row
-        Rows of all parts, with ratios within each.
-    """
+    """Time messages, steps beside them, and steps under a flood of datagrams, by default ten per step."""
     count = datagrams or DATAGRAMS_PER_STEP * steps
     return [
         *_messages(steps, repeats),
@@ -138,7 +119,7 @@ def _messages(calls: int, repeats: int) -> list[Row]:
             timings[name] = time_calls(work, calls, repeats)
         plain.channel.close()
         signed.channel.close()
-    return compared(timings)
+    return with_base(timings)
 
 
 # ---- a step beside ordinary traffic ----
@@ -160,7 +141,7 @@ def _beside_traffic(steps: int, repeats: int) -> list[Row]:
     first, second = "step: no link", f"step: {_MESSAGES} messages/s"
     lost = statistics.median(b / a - 1.0 for a, b in zip(alone, beside, strict=True))
     return [
-        *compared({first: Timing(tuple(alone)), second: Timing(tuple(beside))}),
+        *with_base({first: Timing(tuple(alone)), second: Timing(tuple(beside))}),
         Row(f"{second}, lost", f"{lost:.2%}, the median of {len(alone)} pairs"),
         Row(f"{second}, its thread", f"{statistics.median(busy):.2%} of a processor"),
     ]
@@ -219,9 +200,9 @@ def _under_flood(datagrams: int, steps: int, repeats: int) -> list[Row]:
     rows: list[Row] = []
     grown, looked, errors = 0.0, [], 0
     for pace, name in ((_PACE, f"step at {_PACE:.0f}/s"), (None, "step at full speed")):
-        found: dict[str, list[Array]] = {"calm": [], "flood elsewhere": [], "flood": []}
+        times_by_case: dict[str, list[Array]] = {"calm": [], "flood elsewhere": [], "flood": []}
         for repeat in range(repeats):
-            for case, all_times in found.items():
+            for case, all_times in times_by_case.items():
                 before = _resident()
                 flood = 0 if case == "calm" else datagrams
                 times, link, failures = _flooded(flood, steps, pace, repeat, at_us=case == "flood")
@@ -231,11 +212,11 @@ def _under_flood(datagrams: int, steps: int, repeats: int) -> list[Row]:
                     grown = max(grown, _resident() - before if repeat else 0.0)  # the first repeat fills the caches
                     looked.append(_total_count(link.stats) / datagrams)
         timings: dict[str, Timing | str] = {}
-        for case, all_times in found.items():
+        for case, all_times in times_by_case.items():
             for quantile, word in ((0.5, "median"), (0.999, "99.9th percentile")):
                 of_each = tuple(float(np.quantile(times, quantile)) for times in all_times)
                 timings[f"{name}, {case}: {word}"] = Timing(of_each)
-        rows += compared(timings)
+        rows += with_base(timings)
     summary = f"{datagrams} datagrams each, {statistics.median(looked):.1%} looked at, {errors} errors, "
     rows.append(Row("floods", f"{summary}{grown / 1e6:+.1f} MB of memory"))
     return rows

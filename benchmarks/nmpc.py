@@ -59,9 +59,10 @@ class NmpcGains(NamedTuple):
 class _Step:
     """The law's function: it runs the observer at each step, and makes a plan every `PERIOD`."""
 
-    process: PeerProcess | None = None
-    times: ClassVar[list[float]] = []  # s, computation times of all plans
-    failures = 0  # number of plans that did not converge
+    def __init__(self, process: PeerProcess | None = None) -> None:
+        self.process = process
+        self.times: list[float] = []  # s, computation times of all plans
+        self.failures = 0  # number of plans that did not converge
 
     def __call__(
         self,
@@ -124,23 +125,9 @@ class _Step:
 
 
 def constraints(regions: PackedRegions, path: Array, interval: float) -> dict[str, Any]:
-    """Return the constraints of a plan that stand for regions.
-
-    Parameters
-    ----------
-    regions : PackedRegions
-        Regions at their present positions.
-    path : ndarray, shape (stages, 3)
-        Expected positions of the vehicle at the end of each interval [m, NED].
-    interval : float
-        Duration of a stage [s].
-
-    Returns
-    -------
-    dict
-        ``spheres``, each with center [m, NED], radius [m] and velocity [m/s, NED]; planes of ``hard`` and ``soft``
-        regions, each with a row for each stage: a unit normal [NED], and the least coordinate along it [m].
-    """
+    """Return the constraints of a plan that stand for regions; path (stages, 3) [m, NED], interval [s]."""
+    # Spheres have center [m, NED], radius [m] and velocity [m/s, NED]; planes of hard and soft regions a row for each
+    # stage: a unit normal [NED], and the least coordinate along it [m].
     spheres: list[list[float]] = []
     planes: dict[bool, list[Any]] = {True: [], False: []}
     slope = np.zeros(3)
@@ -184,7 +171,7 @@ class NmpcLaw(CompiledLaw):
 
     name = "nmpc"
     output: ClassVar[Output] = "thrusters"
-    function = _Step()
+    function: ClassVar[_Step] = _Step()
     gains_type = NmpcGains
 
     @classmethod
@@ -225,13 +212,7 @@ def _plain(vehicle: VehicleModel) -> dict[str, Any]:
 
 
 class Planners:
-    """Start the peers that plan for `NmpcLaw`, one for each number of stages and kind of constraints.
-
-    Parameters
-    ----------
-    environment : Environment
-        Environment of the peers, with CasADi.
-    """
+    """Start the peers that plan for `NmpcLaw`, one for each number of stages and kind of constraints."""
 
     def __init__(self, environment: Environment) -> None:
         LAWS["nmpc"] = NmpcLaw
@@ -239,18 +220,12 @@ class Planners:
         self._peers: dict[tuple[int, bool], PeerProcess] = {}
 
     def choose(self, stages: int, spheres: bool) -> None:
-        """Select the planner of `NmpcLaw`: its number of stages, and constraints for spheres or for other shapes.
-
-        Raises
-        ------
-        NotMeasuredError
-            If CasADi is not installed, or the planner cannot start.
-        """
+        """Select the planner of `NmpcLaw`: its number of stages, and constraints for spheres or for other shapes."""
         if (stages, spheres) not in self._peers:
             setup = {"stages": stages, "period": PERIOD, "iterations": ITERATIONS} | (SPHERES if spheres else SHAPES)
             started = peer(self._environment, "casadi", "casadi_nmpc", "controller", setup)
             self._peers[stages, spheres] = self._started.enter_context(started)
-        NmpcLaw.function.process = self._peers[stages, spheres]
+        NmpcLaw.function = _Step(self._peers[stages, spheres])
 
     def close(self) -> None:
         """End the peers."""

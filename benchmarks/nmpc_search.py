@@ -1,4 +1,4 @@
-"""Flights by the predictive controller, and the search for its numbers: that of the other laws, among fewer scenes.
+"""Tune the NMPC gains by random search, and fly scenes with them.
 
 Draws race the best as in `benchmarks.baselines`, safety first. Every flight is a line of a file; a flight that is
 already in the file is not repeated, so that an interrupted search or campaign can continue.
@@ -54,15 +54,7 @@ class Flight(NamedTuple):
 
 
 class Flights:
-    """Fly scenes with the controller, each once.
-
-    Parameters
-    ----------
-    environment : Environment
-        Environment of the peers, with CasADi.
-    path : Path, optional
-        File of flights, one line of JSON each; flights in it are not repeated, new ones are appended.
-    """
+    """Fly scenes with the controller, each once; a file, with one flight per line, has the earlier ones."""
 
     def __init__(self, environment: Environment, path: Path | None = None) -> None:
         self._planners, self._path = Planners(environment), path
@@ -75,18 +67,16 @@ class Flights:
     def fly(self, gains: NmpcGains, kind: str, seed: int, longer: float) -> Flight:
         """Fly a scene for `DURATION`; fly a plain or hard one whose goal is not reached again, for `longer` [s]."""
         flown = self._fly(gains, kind, seed, DURATION)
-        settled = flown.score.reached or kind not in KINDS  # other scenes have a duration of their own
-        return flown if settled else self._fly(gains, kind, seed, longer)
+        is_final = flown.score.reached or kind not in KINDS  # other scenes have a duration of their own
+        return flown if is_final else self._fly(gains, kind, seed, longer)
 
     def _fly(self, gains: NmpcGains, kind: str, seed: int, duration: float) -> Flight:
-        what = {"kind": kind, "seed": seed, "duration": duration, "gains": list(gains)}
-        if (key := _key(what)) in self._known:
+        flight_key = {"kind": kind, "seed": seed, "duration": duration, "gains": list(gains)}
+        if (key := _key(flight_key)) in self._known:
             return self._known[key]
         self._planners.choose(round(gains.stages), kind in KINDS)
-        NmpcLaw.function.times.clear()
-        NmpcLaw.function.failures = 0
-        form: Any = Scene if kind in KINDS else ScenarioScene
-        scene = msgspec.convert(MAKERS[kind](seed), form)
+        scene_type: Any = Scene if kind in KINDS else ScenarioScene
+        scene = msgspec.convert(MAKERS[kind](seed), scene_type)
         lag = _lag(scene) if isinstance(scene, ScenarioScene) else 0.0
         with SceneFlyer("nmpc", Conditions(duration=duration), gains._replace(lag=lag)) as flyer:
             score, _ = flyer.fly(scene)
@@ -94,7 +84,7 @@ class Flights:
         self._known[key] = flight
         if self._path is not None:
             with self._path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(what | flight._asdict()) + "\n")
+                file.write(json.dumps(flight_key | flight._asdict()) + "\n")
         return flight
 
     def close(self) -> None:
@@ -109,28 +99,12 @@ def _lag(scene: ScenarioScene) -> float:
     return float(parameters.get("thrust_time_constant[1]", file[0]))
 
 
-def _key(what: dict[str, Any]) -> str:
-    return json.dumps([what[name] for name in ("kind", "seed", "duration", "gains")])
+def _key(flight: dict[str, Any]) -> str:
+    return json.dumps([flight[name] for name in ("kind", "seed", "duration", "gains")])
 
 
 def search(flights: Flights, count: int, seed: int) -> Candidate:
-    """Search for the best numbers of the controller.
-
-    Parameters
-    ----------
-    flights : Flights
-        Flights by the controller.
-    count : int
-        Number of draws: half of them from `RANGES` and `STAGES`, a quarter each within factors of 1.5 and 1.15 of the
-        best so far.
-    seed : int
-        Seed of the draws.
-
-    Returns
-    -------
-    Candidate
-        Best numbers, and their scores over all scenes.
-    """
+    """Search for the best numbers of the controller, half of the draws from the ranges, the others near the best."""
     rng = np.random.default_rng(seed)
 
     def fly_on(candidate: Candidate, scenes: Iterable[int]) -> Candidate:
@@ -147,9 +121,9 @@ def search(flights: Flights, count: int, seed: int) -> Candidate:
         for _ in range(math.ceil(share * count)):
             gains = draw_gains(NmpcGains, RANGES, rng, best.gains if near < math.inf else None, near)
             stages = float(rng.choice(STAGES)) if near == math.inf else best.gains.stages
-            found = race(gains._replace(stages=stages), best, fly_on, HEATS)
-            if len(found.scores) == SCENES and found.outcome.rank < best.outcome.rank:
-                best = found
+            candidate = race(gains._replace(stages=stages), best, fly_on, HEATS)
+            if len(candidate.scores) == SCENES and candidate.outcome.rank < best.outcome.rank:
+                best = candidate
                 print(f"nmpc: {best.gains}: {format_outcome(best.outcome)}", flush=True)
     return best
 
@@ -157,23 +131,7 @@ def search(flights: Flights, count: int, seed: int) -> Candidate:
 def main(
     kinds: Iterable[str], seed: int, count: int, draws: int, python: str | None = None, out: Path | None = None
 ) -> None:
-    """Fly scenes of some kinds, and print the outcome; or search for the numbers instead.
-
-    Parameters
-    ----------
-    kinds : iterable of str
-        Kinds of scenes, from `FLOWN`.
-    seed : int
-        Seed of the first scene, or of the draws.
-    count : int
-        Number of scenes of each kind.
-    draws : int
-        Number of draws of the search; 0 to fly the scenes instead.
-    python : str, optional
-        Path of a Python with CasADi; default: that of the benchmarks' own environment.
-    out : Path, optional
-        File of flights, as for `Flights`.
-    """
+    """Fly scenes of some kinds, and print the outcome; or search for the numbers instead."""
     flights = Flights(Environment(python), out)
     try:
         if draws:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from benchmarks.table import figure, rounded
+from benchmarks.table import format_3_digits, format_time
 from benchmarks.timing import Timing
 
 PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
@@ -23,25 +23,7 @@ class PageError(Exception):
 
 
 def rewrite(text: str, figures: list[dict[str, Any]]) -> str:
-    """Return a page with tables of new figures.
-
-    Parameters
-    ----------
-    text : str
-        Text of the page, with the marks of each part.
-    figures : list of dict
-        Figures from `benchmarks.table.as_json`.
-
-    Returns
-    -------
-    str
-        Text of the page with new tables.
-
-    Raises
-    ------
-    PageError
-        If the page has no marks for the figures.
-    """
+    """Return a page with tables of new figures."""
     for one in figures:
         mark = re.compile(_PART.format(re.escape(one["verb"]), ".*?"), re.DOTALL)
         if len(mark.findall(text)) != 1:
@@ -55,11 +37,12 @@ def read_figures(path: Path) -> dict[str, Any]:
     """Read a file that ``--json`` wrote; raise PageError for another file."""
     try:
         figures: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        figures["verb"], figures["tables"]
+        for row in (row for table in figures["tables"] for row in table["rows"]):
+            row["paired"] = row["duel"] if "duel" in row else row["paired"]  # duel: the former name
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise PageError(f"{path}: no figures: {type(error).__name__}: {error}") from error
-    if figures["verb"] not in PARTS:
-        raise PageError(f"{path}: figures of {figures['verb']!r}, expected of {' or '.join(PARTS)}")
+    if figures.get("verb") not in PARTS:
+        raise PageError(f"{path}: figures of {figures.get('verb')!r}, expected of {' or '.join(PARTS)}")
     return figures
 
 
@@ -69,17 +52,17 @@ def _lines(figures: dict[str, Any]) -> Iterator[str]:
         yield ""
         yield f"**{table['title']}**"
         yield ""
-        yield from _duels(table["rows"]) if any(row["duel"] for row in table["rows"]) else _plain(table["rows"])
+        yield from _paired_rows(table["rows"]) if any(row["paired"] for row in table["rows"]) else _plain(table["rows"])
         if table["notes"]:
             yield ""
             yield f"Growth: {'; '.join(table['notes'])}."
 
 
-def _duels(rows: list[dict[str, Any]]) -> Iterator[str]:
+def _paired_rows(rows: list[dict[str, Any]]) -> Iterator[str]:
     yield "| ratio | range | ours | median | peer | its median |"
     yield "|--:|--:|---|--:|---|--:|"
     for row in rows:
-        between = "–".join(map(rounded, row["range"])) if row["range"] else ""
+        between = "–".join(map(format_3_digits, row["range"])) if row["range"] else ""
         theirs = _median(row["seconds_against"]) if row["against"] else ""
         yield _row(_ratio(row), between, row["name"], _median(row["seconds"]), _with_note(row, row["against"]), theirs)
 
@@ -88,7 +71,7 @@ def _plain(rows: list[dict[str, Any]]) -> Iterator[str]:
     yield "| ratio | median | least–most | |"
     yield "|--:|--:|--:|---|"
     for row in rows:
-        spread = "–".join(map(figure, (min(row["seconds"]), max(row["seconds"])))) if row["seconds"] else ""
+        spread = "–".join(map(format_time, (min(row["seconds"]), max(row["seconds"])))) if row["seconds"] else ""
         yield _row(_ratio(row), _median(row["seconds"]), spread, _with_note(row, row["name"]))
 
 
@@ -97,11 +80,11 @@ def _row(*cells: str) -> str:
 
 
 def _ratio(row: dict[str, Any]) -> str:
-    return f"{rounded(row['ratio'])}" if row["ratio"] else ""
+    return f"{format_3_digits(row['ratio'])}" if row["ratio"] else ""
 
 
 def _median(seconds: list[float]) -> str:
-    return figure(Timing(tuple(seconds)).median) if seconds else "–"
+    return format_time(Timing(tuple(seconds)).median) if seconds else "–"
 
 
 def _with_note(row: dict[str, Any], name: str) -> str:

@@ -21,21 +21,11 @@ _TIMEOUT = 900.0  # s, longest installation of a peer
 
 @dataclass(frozen=True)
 class Peer:
-    """The requirements of a peer.
+    """The requirements of a peer."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the distribution on PyPI.
-    more : tuple of str
-        Further requirements, which the distribution does not declare.
-    environment : str
-        Name of its virtual environment; most peers share one.
-    """
-
-    name: str
-    more: tuple[str, ...] = ()
-    environment: str = "shared"
+    name: str  # name of the distribution on PyPI
+    more: tuple[str, ...] = ()  # further requirements, which the distribution does not declare
+    environment: str = "shared"  # name of its virtual environment
 
 
 _TBB = ("tbb>=2021.13",) if sys.platform == "linux" else ()
@@ -63,18 +53,7 @@ def folder() -> Path:
 
 
 def install(again: bool = False) -> dict[str, str]:
-    """Install all peers whose installation was not tried before, one by one.
-
-    Parameters
-    ----------
-    again : bool
-        True to try failed installations again.
-
-    Returns
-    -------
-    dict from str to str
-        Version of each peer, or the reason after "not installed: ".
-    """
+    """Install all peers that were not tried before; return the version of each, or the reason why it has none."""
     state = {name: version for name, version in _state().items() if name in PEERS}
     for peer in PEERS.values():
         if peer.name in state and not (again and state[peer.name].startswith("not installed")):
@@ -128,13 +107,7 @@ def _version(python: str, name: str) -> str:
 
 
 class Environment:
-    """Find the Python interpreters of peers.
-
-    Parameters
-    ----------
-    python : str, optional
-        A Python with the peers, or some of them; default: the benchmarks' own environments, made if missing.
-    """
+    """Finds the Python interpreters of peers: a given one, or the benchmarks' own environments, made if missing."""
 
     def __init__(self, python: str | None = None) -> None:
         self._python = python
@@ -155,5 +128,5 @@ class Environment:
 
     def summary(self) -> str:
         """Format the versions of the installed peers."""
-        found = {name: self.version(name) for name in PEERS}
-        return ", ".join(f"{name} {version}" for name, version in found.items() if not version.startswith("not"))
+        versions = {name: self.version(name) for name in PEERS}
+        return ", ".join(f"{name} {version}" for name, version in versions.items() if not version.startswith("not"))

@@ -19,15 +19,7 @@ _TAIL = 300  # number of the last characters of a peer's error output that a rea
 
 
 class PeerProcess:
-    """A contestant: a function in a file of `benchmarks.peers`.
-
-    Parameters
-    ----------
-    process : Popen
-        Process of ``serve.py``.
-    stderr : Path
-        File of its error output.
-    """
+    """A contestant: a function in a file of `benchmarks.peers`."""
 
     def __init__(self, process: subprocess.Popen[str], stderr: Path) -> None:
         self._process, self._stderr = process, stderr
@@ -60,24 +52,7 @@ class PeerProcess:
 def peer(
     environment: Environment, package: str, module: str, function: str, setup: dict[str, Any]
 ) -> Iterator[PeerProcess]:
-    """Start a peer, and end it afterwards.
-
-    Parameters
-    ----------
-    environment : Environment
-        Environment in which it is installed.
-    package : str
-        Distribution that it needs.
-    module, function : str
-        Function in a module of `benchmarks.peers`.
-    setup : dict
-        Argument of the function, as values for JSON.
-
-    Raises
-    ------
-    NotMeasuredError
-        If the peer is not installed, or cannot start.
-    """
+    """Start a peer, and end it afterwards."""
     python = environment.python(package)
     with tempfile.TemporaryDirectory(prefix="peer-", ignore_cleanup_errors=True) as scratch:
         stderr = Path(scratch) / "stderr"

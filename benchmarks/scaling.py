@@ -13,8 +13,8 @@ from benchmarks.contests.closed_loop import CHANGES, RUN, SCENARIO, flights
 from benchmarks.contests.sweeps import sweep
 from benchmarks.law import LawSteps
 from benchmarks.machine import pinned
-from benchmarks.table import Row, Table, compared, figure
-from benchmarks.timing import Contestant, Own, Timing, growth, straight, take_turns
+from benchmarks.table import Row, Table, format_time, with_base
+from benchmarks.timing import Contestant, InProcess, Timing, fit_exponent, fit_line, take_turns
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 
@@ -30,96 +30,63 @@ _SWEEPS = 3  # maximum number of repeats of a sweep
 
 @dataclass(frozen=True)
 class Curve:
-    """Costs over sizes.
+    """Costs over sizes."""
 
-    Attributes
-    ----------
-    title : str
-        Description of an item.
-    of : str
-        Name of one unit of the size, such as ``obstacle``.
-    entries : mapping from float to Entry
-        Entries by size.
-    count : int, optional
-        Items per repeat, if the items are long.
-    """
-
-    title: str
-    of: str
-    entries: Mapping[float, Entry]
-    count: int | None = None
+    title: str  # description of an item
+    of: str  # name of one unit of the size, such as ``obstacle``
+    entries: Mapping[float, Entry]  # entries by size
+    count: int | None = None  # items per repeat, if they are long
 
     def measure(self, budget: float, repeats: int) -> Table:
         """Time all sizes in turn, on one processor; the law of growth is in the notes."""
         with pinned(), ExitStack() as stack:
             contestants = [entered(entry, stack) for entry in self.entries.values()]
-            found = take_turns(contestants, budget, repeats, self.count)
+            timings = take_turns(contestants, budget, repeats, self.count)
         names = [self._name(size) for size in self.entries]
-        rows = tuple(Row(name, timing, names[0], found[0]) for name, timing in zip(names, found, strict=True))
-        return Table(self.title, rows, self._laws(found))
+        rows = tuple(Row(name, timing, names[0], timings[0]) for name, timing in zip(names, timings, strict=True))
+        return Table(self.title, rows, self._laws(timings))
 
     def _name(self, size: float) -> str:
         return f"{size:g} {self.of}{'s' if size != 1 else ''}"
 
-    def _laws(self, found: list[Timing | str]) -> tuple[str, ...]:
+    def _laws(self, timings: list[Timing | str]) -> tuple[str, ...]:
         """Return the laws of growth: the exponent of a power of the sizes, and the two coefficients of a line."""
-        sizes = [size for size, one in zip(self.entries, found, strict=True) if isinstance(one, Timing)]
-        costs = [one.median for one in found if isinstance(one, Timing)]
+        sizes = [size for size, one in zip(self.entries, timings, strict=True) if isinstance(one, Timing)]
+        costs = [one.median for one in timings if isinstance(one, Timing)]
         if len(sizes) < 2:
             return ()
-        parts = [growth(pair, cost) for pair, cost in zip(pairwise(sizes), pairwise(costs), strict=True)]
-        power = f"exponent {growth(sizes, costs):.2f}; from one size to the next {', '.join(f'{x:.2f}' for x in parts)}"
+        parts = [fit_exponent(pair, cost) for pair, cost in zip(pairwise(sizes), pairwise(costs), strict=True)]
+        between = ", ".join(f"{x:.2f}" for x in parts)
+        power = f"exponent {fit_exponent(sizes, costs):.2f}; from one size to the next {between}"
         if len(sizes) < 3:
             return (power,)
-        fixed, each, off = straight(sizes, costs)
-        return (power, f"about {figure(fixed)} and {figure(each)} for each {self.of}, to {100 * off:.0f} %")
+        fixed, per_unit, off = fit_line(sizes, costs)
+        return (
+            power,
+            f"about {format_time(fixed)} and {format_time(per_unit)} for each {self.of}, to {100 * off:.0f} %",
+        )
 
 
 @dataclass(frozen=True)
 class SweepComparison:
-    """Costs of one sweep by several kinds of workers.
+    """Costs of one sweep by several kinds of workers."""
 
-    Attributes
-    ----------
-    title : str
-        Description of an item.
-    entries : mapping from str to Entry
-        Entries by name, that of one worker first.
-    rows : int
-        Rows of the sweep.
-    """
-
-    title: str
-    entries: Mapping[str, Entry]
-    rows: int
+    title: str  # description of an item
+    entries: Mapping[str, Entry]  # entries by name, that of one worker first
+    rows: int  # number of rows of the sweep
 
     def measure(self, budget: float, repeats: int) -> Table:
         """Time all entries in turn, on all processors; the speedups over the first are in the notes."""
         with ExitStack() as stack:
             contestants = [entered(entry, stack) for entry in self.entries.values()]
-            found = take_turns(contestants, budget, min(repeats, _SWEEPS), self.rows)
-        first, *others = compared(dict(zip(self.entries, found, strict=True)))
+            timings = take_turns(contestants, budget, min(repeats, _SWEEPS), self.rows)
+        first, *others = with_base(dict(zip(self.entries, timings, strict=True)))
         notes = tuple(f"{row.name}: {1.0 / row.ratio:.2f} times as fast as {first.name}" for row in others if row.ratio)
         return Table(self.title, (first, *others), notes)
 
 
 def measure(subjects: list[str], budget: float, repeats: int) -> list[Table]:
-    """Time the curves of some subjects.
-
-    Parameters
-    ----------
-    subjects : list of str
-        Names of subjects in `SUBJECTS`.
-    budget : float
-        Time of a repeat of each size [s].
-    repeats : int
-        Number of repeats.
-
-    Returns
-    -------
-    list of Table
-        A table for each curve.
-    """
+    """Time the curves of some subjects; budget [s] of a repeat of each size."""
     tables = []
     for subject in subjects:
         for curve in SUBJECTS[subject]():
@@ -191,6 +158,6 @@ def _run(duration: float) -> Entry:
                 with Master(scenario) as master:
                     master.run()
 
-        return Own(work)
+        return InProcess(work)
 
     return entry

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from benchmarks import sitl_pilot
 from benchmarks.sitl_pilot import HEAD, MAGIC, PULSES, RATE, WARMING
-from benchmarks.table import Row, compared
+from benchmarks.table import Row, with_base
 from benchmarks.timing import Timing, time_calls
 from cosim.sitl import json_protocol
 from cosim.sitl.json_server import JsonServer
@@ -22,18 +22,7 @@ RATIO = "how many times as long as the plant's step"
 
 
 def measure(steps: int, repeats: int) -> list[Row]:
-    """Time the parts of a frame, and whole frames by the stand-in's clock.
-
-    Parameters
-    ----------
-    steps, repeats : int
-        Frames per repeat, and number of repeats.
-
-    Returns
-    -------
-    list of Row
-        Rows with ratios to the plant's step.
-    """
+    """Time the parts of a frame, and whole frames by the stand-in's clock."""
     timings: dict[str, Timing | str] = {}
     with tempfile.TemporaryDirectory() as folder:
         flights = SitlSession(FlightOptions(out=Path(folder) / "run", report=False), "ardupilot", make_pwm_law)
@@ -56,25 +45,12 @@ def measure(steps: int, repeats: int) -> list[Row]:
     for what, record_rate in (("record at 100 Hz", 100.0), ("every step recorded", float(RATE))):
         timing = lockstep(steps, repeats, record_rate)
         timings[f"whole frame, {what}: {1 / timing.median:.0f} frames/s"] = timing
-    return compared(timings)
+    return with_base(timings)
 
 
 def lockstep(steps: int, repeats: int, record_rate: float = 100.0) -> Timing:
-    """Time whole flights: the server in this process, the stand-in in another one, which measures the time.
-
-    Parameters
-    ----------
-    steps, repeats : int
-        Frames per flight, and number of flights.
-    record_rate : float
-        Rows of the record per simulated second [Hz].
-
-    Returns
-    -------
-    Timing
-        Time of a frame.
-    """
-    found = []
+    """Time frames of whole flights: the server is in this process, the stand-in, which measures, in another one."""
+    times = []
     overrides = (f"time.step={1.0 / RATE!r}", f"time.duration={(WARMING + steps) / RATE!r}")
     for _ in range(repeats):
         with tempfile.TemporaryDirectory() as folder:
@@ -86,5 +62,5 @@ def lockstep(steps: int, repeats: int, record_rate: float = 100.0) -> Timing:
             with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as pilot:
                 server.serve()
                 printed, _ = pilot.communicate(timeout=60.0)
-            found.append(float(printed) / steps)
-    return Timing(tuple(found))
+            times.append(float(printed) / steps)
+    return Timing(tuple(times))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.table import Row, compared
+from benchmarks.table import Row, with_base
 from benchmarks.timing import Timing, time_calls
 from controller.compiling.function import BoundCall
 from cosim.results.recorder import Recorder
@@ -25,18 +25,7 @@ _SLOWER = 50  # divisor of the calls of slower parts
 
 
 def measure(steps: int, repeats: int) -> list[Row]:
-    """Time each part of a step, and whole steps.
-
-    Parameters
-    ----------
-    steps, repeats : int
-        Steps per repeat, and number of repeats.
-
-    Returns
-    -------
-    list of Row
-        Rows with ratios to the plant's step.
-    """
+    """Time each part of a step, and whole steps."""
     timings: dict[str, Timing] = {}
     rng = np.random.default_rng(0)
 
@@ -67,7 +56,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
         how = "with record" if record else "no record"
         timings[f"whole step, closed form, {how}"] = _whole("closed", steps, repeats, record=record)
     timings["whole step, scikit-fuzzy, with record"] = _whole("skfuzzy", steps, repeats, record=True)
-    return compared(timings)
+    return with_base(timings)
 
 
 def _law_alone(master: Master) -> Callable[[], None]:
@@ -79,7 +68,7 @@ def _law_alone(master: Master) -> Callable[[], None]:
 def _whole(engine: str, steps: int, repeats: int, *, record: bool) -> Timing:
     """Time whole runs by `Master.run`, as in `cosim run`; return the time of a step."""
     scenario = load_scenario("paper", [f"arbiter.engine={engine}", f"time.duration={steps / 1000}"])
-    found = []
+    times = []
     for _ in range(repeats):
         with tempfile.TemporaryDirectory() as folder, Master(scenario) as master:
             observers = [Recorder(Path(folder), master.signals.columns)] if record else []
@@ -87,5 +76,5 @@ def _whole(engine: str, steps: int, repeats: int, *, record: bool) -> Timing:
             master.run(observers)
             for recorder in observers:
                 recorder.close()
-            found.append((time.perf_counter() - before) / scenario.steps)
-    return Timing(tuple(found))
+            times.append((time.perf_counter() - before) / scenario.steps)
+    return Timing(tuple(times))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-_MOST = 10**9  # maximum number of items of a repeat
+_MAX_ITEMS = 10**9  # maximum number of items of a repeat
 
 
 class NotMeasuredError(Exception):
@@ -22,8 +22,8 @@ class Timing:
     samples: tuple[float, ...]  # s
 
     @property
-    def least(self) -> float:
-        """Least time of an item [s]."""
+    def min(self) -> float:
+        """Minimum time of an item [s]."""
         return min(self.samples)
 
     @property
@@ -32,8 +32,8 @@ class Timing:
         return statistics.median(self.samples)
 
     @property
-    def most(self) -> float:
-        """Greatest time of an item [s]."""
+    def max(self) -> float:
+        """Maximum time of an item [s]."""
         return max(self.samples)
 
 
@@ -45,14 +45,8 @@ class Contestant(Protocol):
         ...
 
 
-class Own:
-    """A contestant in this process.
-
-    Parameters
-    ----------
-    work : callable
-        Function that runs a given number of items.
-    """
+class InProcess:
+    """A contestant in this process."""
 
     def __init__(self, work: Callable[[int], object]) -> None:
         self._work = work
@@ -64,7 +58,7 @@ class Own:
         return time.perf_counter() - before
 
 
-def each(work: Callable[[], object]) -> Callable[[int], None]:
+def repeat_call(work: Callable[[], object]) -> Callable[[int], None]:
     """Return a function that calls `work` a given number of times."""
 
     def batch(count: int) -> None:
@@ -74,7 +68,7 @@ def each(work: Callable[[], object]) -> Callable[[int], None]:
     return batch
 
 
-def timed(contestant: Contestant, count: int, repeats: int) -> Timing:
+def time_contestant(contestant: Contestant, count: int, repeats: int) -> Timing:
     """Time `count` items per repeat, after one more repeat that compiles and warms the caches."""
     contestant.seconds(count)
     return Timing(tuple(contestant.seconds(count) / count for _ in range(repeats)))
@@ -82,40 +76,23 @@ def timed(contestant: Contestant, count: int, repeats: int) -> Timing:
 
 def time_batches(batch: Callable[[], object], items: int, repeats: int) -> Timing:
     """Time a function that runs `items` items per call."""
-    return timed(Own(lambda _: batch()), items, repeats)
+    return time_contestant(InProcess(lambda _: batch()), items, repeats)
 
 
 def time_calls(work: Callable[[], object], calls: int, repeats: int) -> Timing:
     """Time a function that runs one item per call."""
-    return timed(Own(each(work)), calls, repeats)
+    return time_contestant(InProcess(repeat_call(work)), calls, repeats)
 
 
 def take_turns(
     contestants: Sequence[Contestant | str], budget: float, repeats: int, count: int | None = None
 ) -> list[Timing | str]:
-    """Time contestants in turn, so that other load of the machine affects all of them alike.
-
-    Parameters
-    ----------
-    contestants : sequence of Contestant or str
-        Contestants; a text in place of one is returned unchanged.
-    budget : float
-        Least time of a repeat [s]; it determines the number of items of each contestant.
-    repeats : int
-        Number of repeats.
-    count : int, optional
-        Items per repeat, instead of the budget; then there is no warm-up.
-
-    Returns
-    -------
-    list of Timing or str
-        Timings in the order of the contestants; a text where one failed.
-    """
-    found: list[list[float] | str] = [[] if not isinstance(one, str) else one for one in contestants]
+    """Time contestants in turn, which load affects alike; budget [s] of a repeat, or `count` without a warm-up."""
+    all_samples: list[list[float] | str] = [[] if not isinstance(one, str) else one for one in contestants]
     counts = [0] * len(contestants)
     for repeat in range(repeats):
         for i, one in enumerate(contestants):
-            samples = found[i]
+            samples = all_samples[i]
             if isinstance(one, str) or isinstance(samples, str):
                 continue
             try:
@@ -123,21 +100,21 @@ def take_turns(
                     counts[i] = count or count_for(one, budget)
                 samples.append(one.seconds(counts[i]) / counts[i])
             except NotMeasuredError as why:
-                found[i] = str(why)
-    return [one if isinstance(one, str) else Timing(tuple(one)) for one in found]
+                all_samples[i] = str(why)
+    return [one if isinstance(one, str) else Timing(tuple(one)) for one in all_samples]
 
 
 def count_for(contestant: Contestant, budget: float) -> int:
     """Return the number of items that take a contestant at least `budget` [s]; its caches are warm afterwards."""
     contestant.seconds(1)
     count = 1
-    while (taken := contestant.seconds(count)) < budget and count < _MOST:
+    while (elapsed := contestant.seconds(count)) < budget and count < _MAX_ITEMS:
         # a fast item is mostly overhead at first, so increase the count in steps
-        count = min(max(2 * count, int(1.1 * count * budget / max(taken, 1e-9))), 100 * count, _MOST)
+        count = min(max(2 * count, int(1.1 * count * budget / max(elapsed, 1e-9))), 100 * count, _MAX_ITEMS)
     return count
 
 
-def growth(sizes: Sequence[float], costs: Sequence[float]) -> float:
+def fit_exponent(sizes: Sequence[float], costs: Sequence[float]) -> float:
     """Return the exponent k of cost = c size^k, by least squares in logarithms."""
     import numpy as np
 
@@ -145,11 +122,11 @@ def growth(sizes: Sequence[float], costs: Sequence[float]) -> float:
     return float(slope)
 
 
-def straight(sizes: Sequence[float], costs: Sequence[float]) -> tuple[float, float, float]:
+def fit_line(sizes: Sequence[float], costs: Sequence[float]) -> tuple[float, float, float]:
     """Fit cost = a + b size, a, b >= 0, by least squares of relative errors; return a, b and the maximum error."""
     import numpy as np
     from scipy.optimize import nnls
 
     per_cost = np.c_[np.ones(len(sizes)), np.asarray(sizes, dtype=float)] / np.array(costs)[:, None]
-    (fixed, each), _ = nnls(per_cost, np.ones(len(costs)))
-    return float(fixed), float(each), float(np.abs(per_cost @ (fixed, each) - 1.0).max())
+    (fixed, per_item), _ = nnls(per_cost, np.ones(len(costs)))
+    return float(fixed), float(per_item), float(np.abs(per_cost @ (fixed, per_item) - 1.0).max())

@@ -35,13 +35,13 @@ _PLAY = """
 const [speed, seconds, done] = arguments;
 const { page, player } = window.subreach;
 const parts = { frame: [page, "paint"], scene: [page.stage, "draw"], charts: [page.board, "point"] };
-const taken = { at: [], frame: [], scene: [], charts: [] };
+const times = { start: [], frame: [], scene: [], charts: [] };
 for (const [name, [owner, method]] of Object.entries(parts)) {
   owner[method] = (...values) => {
     const before = performance.now();
     Object.getPrototypeOf(owner)[method].apply(owner, values);
-    taken[name].push(performance.now() - before);
-    if (name === "frame") taken.at.push(before);
+    times[name].push(performance.now() - before);
+    if (name === "frame") times.start.push(before);
   };
 }
 player.seek(0);
@@ -51,39 +51,26 @@ player.play();
 setTimeout(() => {
   player.pause();
   for (const [owner, method] of Object.values(parts)) delete owner[method];
-  done(taken);
+  done(times);
 }, 1000 * (seconds + 0.5));
 """
 
 
 def measure(steps: int, repeats: int) -> list[Row]:
-    """Time pages of a short, a middling and a long run, and play the long one.
-
-    Parameters
-    ----------
-    steps : int
-        Steps of the long run.
-    repeats : int
-        Number of times that a page is written and opened, and duration of its playback at each speed [s].
-
-    Returns
-    -------
-    list of Row
-        Rows of all pages and speeds.
-    """
+    """Time pages of a short, a middling and a long run, and play the long one."""
     with tempfile.TemporaryDirectory() as folder, _browser(Path(folder)) as browser:
         rows = []
         for count in (*(other for other in _OTHERS if other < steps), steps):
-            page, written = _page(Path(folder) / f"run-{count}", count, repeats)
+            page, written = _time_page_write(Path(folder) / f"run-{count}", count, repeats)
             what = f"page of {count * _STEP:g} s, {page.stat().st_size / 1e6:.2f} MB"
             rows.append(Row(f"{what}: written", written))
-            rows.append(Row(f"{what}: opened", _opened(browser, page, repeats) if browser else _NO_BROWSER))
+            rows.append(Row(f"{what}: opened", _time_page_load(browser, page, repeats) if browser else _NO_BROWSER))
         for speed in _SPEEDS:
-            rows += _played(browser, speed, repeats)
+            rows += _measure_frame_rate(browser, speed, repeats)
     return rows
 
 
-def _page(folder: Path, steps: int, repeats: int) -> tuple[Path, Timing]:
+def _time_page_write(folder: Path, steps: int, repeats: int) -> tuple[Path, Timing]:
     scenario = load_scenario(_SCENARIO, ["arbiter.engine=closed", f"time.duration={steps * _STEP!r}"])
     run = load_run(run_scenario(scenario, folder, report=False).folder)
     times = []
@@ -122,7 +109,7 @@ def _browser(folder: Path) -> Iterator[Any]:
         driver.quit()
 
 
-def _opened(browser: Any, page: Path, repeats: int) -> Timing:
+def _time_page_load(browser: Any, page: Path, repeats: int) -> Timing:
     """Time a page from the request of its address to the first picture."""
     from selenium.webdriver.support.ui import WebDriverWait
 
@@ -137,21 +124,21 @@ def _opened(browser: Any, page: Path, repeats: int) -> Timing:
     return Timing(tuple(times))
 
 
-def _played(browser: Any, speed: float, seconds: int) -> list[Row]:
+def _measure_frame_rate(browser: Any, speed: float, seconds: int) -> list[Row]:
     """Play the open page for some seconds; return rows whose samples are means of the frames in each second."""
     name = f"played at {speed:g}x"
     if not browser:
         return [Row(name, _NO_BROWSER)]
-    taken = browser.execute_async_script(_PLAY, speed, seconds)
-    begin = taken["at"][0]
-    of_second = [[i for i, at in enumerate(taken["at"]) if s <= (at - begin) / 1e3 < s + 1] for s in range(seconds)]
-    counts = sorted(len(frames) for frames in of_second)
+    times = browser.execute_async_script(_PLAY, speed, seconds)
+    frame_times = [(start - times["start"][0]) / 1e3 for start in times["start"]]  # s
+    frames_by_second = [[i for i, t in enumerate(frame_times) if s <= t < s + 1] for s in range(seconds)]
+    counts = sorted(len(frames) for frames in frames_by_second)
     if not counts[0]:
         return [Row(name, "a second went by without a frame")]
     summary = f"{name}: {counts[len(counts) // 2]} frames/s, in the worst second {counts[0]}"
     rows = [Row(summary, Timing(tuple(1.0 / count for count in counts)), "frame at 30/s", _SMOOTH)]
     for part in ("frame", "scene", "charts"):
-        means = [_mean([taken[part][i] for i in frames if i < len(taken[part])]) / 1e3 for frames in of_second]
+        means = [_mean([times[part][i] for i in frames if i < len(times[part])]) / 1e3 for frames in frames_by_second]
         what = "all of a frame" if part == "frame" else f"of that, {part}"
         rows.append(Row(f"{name}: {what}", Timing(tuple(means)), "frame at 30/s", _SMOOTH))
     return rows

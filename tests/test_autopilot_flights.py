@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from benchmarks.autopilot import flights
+from benchmarks.autopilot.flight_evaluation import clearances_at
 from benchmarks.autopilot.flights import Task
-from benchmarks.autopilot.judgement import clearances_at
 from benchmarks.autopilot.scenes import random_scene
 from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario

@@ -17,8 +17,8 @@ from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import peer
 from benchmarks.peers import numba_body, numpy_body
 from benchmarks.scaling import Curve
-from benchmarks.table import Row, Table, as_json, figure, print_tables, write_json
-from benchmarks.timing import NotMeasuredError, Own, Timing, count_for, growth, straight, take_turns
+from benchmarks.table import Row, Table, as_json, format_time, print_tables, write_json
+from benchmarks.timing import InProcess, NotMeasuredError, Timing, count_for, fit_exponent, fit_line, take_turns
 from benchmarks.vehicle_numbers import vehicle_numbers
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
@@ -90,10 +90,10 @@ def test_growth_exponent_is_printed_for_each_curve(capsys, monkeypatch):
 
 
 def test_comparison_row_shows_the_time_ratio(capsys):
-    row = Row("ours", Timing((2e-6, 1e-6, 3e-6)), "theirs", Timing((8e-6, 8e-6, 6e-6)), duel=True)
+    row = Row("ours", Timing((2e-6, 1e-6, 3e-6)), "theirs", Timing((8e-6, 8e-6, 6e-6)), is_paired=True)
     assert row.ratio == 4.0
     assert row.range == (2.0, 8.0)
-    missing = Row("ours", Timing((1.0,)), "nobody", "not installed: no such thing", duel=True)
+    missing = Row("ours", Timing((1.0,)), "nobody", "not installed: no such thing", is_paired=True)
     print_tables([Table("a step", (row, missing))], "theirs to ours", ["a machine"])
     machine, _, heading, title, first, second = capsys.readouterr().out.splitlines()
     assert (machine, title) == ("a machine", "-- a step")
@@ -112,7 +112,7 @@ def test_parts_are_shown_as_multiples_of_their_base():
     [(1.0, "1.00 s"), (0.0123, "12.3 ms"), (4.5678e-6, "4.57 µs"), (250e-9, "250 ns"), (0.9999, "1.00 s")],
 )
 def test_figures_are_printed_with_units(seconds, text):
-    assert figure(seconds) == text
+    assert format_time(seconds) == text
 
 
 # ---- taking turns ----
@@ -151,23 +151,25 @@ def test_failed_start_is_shown_in_its_row():
     def no(_):
         raise OSError("no such device")
 
-    (row,) = Contest("a step", {"ours": lambda _: Own(lambda n: sum(range(n)))}, {"peer": no}).measure(1e-5, 2).rows
+    (row,) = (
+        Contest("a step", {"ours": lambda _: InProcess(lambda n: sum(range(n)))}, {"peer": no}).measure(1e-5, 2).rows
+    )
     assert row.ratio is None
     assert row.base_timing == "OSError: no such device"
 
 
 def test_growth_exponent_is_estimated():
-    assert growth([1, 10, 100], [3.0, 3e2, 3e4]) == pytest.approx(2.0)
+    assert fit_exponent([1, 10, 100], [3.0, 3e2, 3e4]) == pytest.approx(2.0)
     log = []
     curve = Curve("a step", "things", {n: lambda _, n=n: KnownScene("a", log, n**1.5) for n in (1, 4, 16)}, count=1)
     assert curve.measure(0.0, 2).notes[0] == "exponent 1.50; from one size to the next 1.50, 1.50"
 
 
 def test_linear_growth_has_a_fixed_and_a_proportional_part():
-    assert straight([1, 10, 100], [5e-6 + 2e-7 * n for n in (1, 10, 100)]) == pytest.approx(
+    assert fit_line([1, 10, 100], [5e-6 + 2e-7 * n for n in (1, 10, 100)]) == pytest.approx(
         (5e-6, 2e-7, 0.0), abs=1e-12
     )
-    fixed, each, off = straight([1, 2, 4], [1.0, 2.0, 8.0])
+    fixed, each, off = fit_line([1, 2, 4], [1.0, 2.0, 8.0])
     assert fixed == 0.0
     assert 0.1 < off < 1.0 < each
 
@@ -235,10 +237,10 @@ def test_the_numpy_plant_is_the_same_plant(tmp_path):
 
 
 def test_page_update_replaces_only_figures(tmp_path):
-    duel = Row("ours", Timing((1e-6, 2e-6)), "a|b", Timing((4e-6, 4e-6)), duel=True)
-    missing = Row("ours", Timing((1e-6,)), "nobody", "not installed", duel=True)
+    paired = Row("ours", Timing((1e-6, 2e-6)), "a|b", Timing((4e-6, 4e-6)), is_paired=True)
+    missing = Row("ours", Timing((1e-6,)), "nobody", "not installed", is_paired=True)
     plain = Row("3 obstacles", Timing((2.0,)), "1 obstacles", Timing((1.0,)))
-    tables = {"all": [Table("a step", (duel, missing))], "scaling": [Table("a run", (plain,), ("grows",))]}
+    tables = {"all": [Table("a step", (paired, missing))], "scaling": [Table("a run", (plain,), ("grows",))]}
     figures = []
     for verb, of_verb in tables.items():
         write_json(tmp_path / verb, as_json(verb, of_verb, "theirs to ours", ["a machine", "calm"]))

@@ -39,9 +39,7 @@ def planner(monkeypatch):
             }
 
     monkeypatch.setitem(LAWS, "nmpc", nmpc.NmpcLaw)
-    monkeypatch.setattr(nmpc.NmpcLaw.function, "process", Planner())
-    monkeypatch.setattr(nmpc.NmpcLaw.function, "failures", 0)
-    nmpc.NmpcLaw.function.times.clear()
+    monkeypatch.setattr(nmpc.NmpcLaw, "function", nmpc._Step(Planner()))
     return nmpc.NmpcLaw.function.process
 
 
@@ -185,7 +183,12 @@ def test_the_search_finds_fast_settings_among_safe_ones():
 @pytest.mark.medium
 def test_flights_in_the_file_are_not_flown_again(monkeypatch, tmp_path, planner):
     started = []
-    monkeypatch.setattr(nmpc.Planners, "choose", lambda self, *what: started.append(what))
+
+    def choose(self, *what):
+        started.append(what)
+        nmpc.NmpcLaw.function = nmpc._Step(planner)
+
+    monkeypatch.setattr(nmpc.Planners, "choose", choose)
     monkeypatch.setattr(nmpc_search, "DURATION", 0.2)
     path = tmp_path / "flights.jsonl"
     gains = nmpc.NmpcGains()

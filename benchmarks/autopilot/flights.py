@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.autopilot.judgement import Flown, judge
+from benchmarks.autopilot.flight_evaluation import FlightEvents, evaluate_flight
 from benchmarks.autopilot.scenes import random_scene
 from benchmarks.autopilot.simulated_link import FAULTS, SimulatedLink
 from cosim.command_line.process import kills_interrupt
@@ -86,24 +86,7 @@ class Task:
 
 
 def fly(task: Task, ardusub: Path, instance: int, folder: Path) -> dict[str, Any]:
-    """Make a flight, and judge it.
-
-    Parameters
-    ----------
-    task : Task
-        Definition of the flight.
-    ardusub : Path
-        Path of ArduSub's program for SITL.
-    instance : int
-        Number of the ArduSub instance: its ports are 5760 + 10 × instance, and those 2 and 3 above.
-    folder : Path
-        Folder for the files of the flight; its present contents are removed.
-
-    Returns
-    -------
-    dict
-        Result of the flight, as values for JSON.
-    """
+    """Make a flight into an emptied folder, and evaluate it; ports are 5760 + 10 × instance and 2, 3 above."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     begun = time.monotonic()
@@ -126,11 +109,11 @@ def fly(task: Task, ardusub: Path, instance: int, folder: Path) -> dict[str, Any
         stack.callback(link.close)
         if task.fault:
             link.others = stack.enter_context(GroundLink(endpoints[1], identity=GROUND_STATION))
-        flown = Flown()
+        events = FlightEvents()
         with contextlib.suppress(RunError):  # a flight that fails; the plant's record remains
-            flights.fly(lambda: _steer(task, scenario, link, flown, folder), server.counts)
-    result = {"key": task.key, "status": flown.status, "wall": round(time.monotonic() - begun, 1)}
-    return result | judge(scenario, flown, folder / "plant")
+            flights.fly(lambda: _steer(task, scenario, link, events, folder), server.counts)
+    result = {"key": task.key, "status": events.status, "wall": round(time.monotonic() - begun, 1)}
+    return result | evaluate_flight(scenario, events, folder / "plant")
 
 
 @contextlib.contextmanager
@@ -152,7 +135,7 @@ def _running(ardusub: Path, instance: int, port: int, folder: Path, task: Task) 
             process.wait()
 
 
-def _steer(task: Task, scenario: Scenario, link: SimulatedLink, flown: Flown, folder: Path) -> str:
+def _steer(task: Task, scenario: Scenario, link: SimulatedLink, events: FlightEvents, folder: Path) -> str:
     """Wait until the vehicle is at its start, fly it with the companion, and return the status of the plant's run."""
     while link.clock() < _LOWERED:
         link.advance()
@@ -163,25 +146,25 @@ def _steer(task: Task, scenario: Scenario, link: SimulatedLink, flown: Flown, fo
     companion = Companion(scenario, link, options)
 
     def note(state: str, missing: str) -> None:
-        if not flown.states or flown.states[-1][1] != state:
-            flown.states.append((link.clock(), state))
+        if not events.states or events.states[-1][1] != state:
+            events.states.append((link.clock(), state))
         offset = companion.session.alignment.offset
         if offset is not None:
-            flown.offset = offset.tolist()
+            events.offset = offset.tolist()
         if state == "steering" and task.fault and not link.events:
-            flown.failed_at = link.clock() + FAULT_AFTER
-            link.events.append((flown.failed_at, lambda: FAULTS[task.fault](link)))
+            events.failed_at = link.clock() + FAULT_AFTER
+            link.events.append((events.failed_at, lambda: FAULTS[task.fault](link)))
 
     try:
         if task.is_random:
             set_origin(link)
-        flown.status = companion.run(folder / "companion", report=False, on_state=note).summary["status"]
+        events.status = companion.run(folder / "companion", report=False, on_state=note).summary["status"]
     except CosimError as error:
-        flown.status = f"failed: {error}"
+        events.status = f"failed: {error}"
     except KeyboardInterrupt:
-        flown.status = "interrupted"
+        events.status = "interrupted"
         raise
-    flown.begun = link.waited()
+    events.begun = link.waited()
     return "completed"
 
 
@@ -203,26 +186,13 @@ def set_origin(link: AutopilotLink) -> None:
 def make_flights(
     tasks: Sequence[Task], ardusub: Path, instance: int, out: Path | None, keep: Path | None = None
 ) -> None:
-    """Make flights, print a line of JSON for each, and their summary. A signal that ends it ends ArduSub too.
-
-    Parameters
-    ----------
-    tasks : sequence of Task
-        Definitions of the flights.
-    ardusub : Path
-        Path of ArduSub's program for SITL.
-    instance : int
-        Number of the ArduSub instance, for its ports.
-    out : Path, optional
-        File of results, one line per flight; flights in it are not repeated. New ones are appended, without those that
-        have failed: they are flown again the next time.
-    keep : Path, optional
-        Folder in which each flight's files are kept.
-    """
+    """Make the flights that are not in a file of results, print a line of JSON for each, and a summary."""
+    # New flights are appended to the file without those that have failed: they are flown again the next time. A signal
+    # that ends it ends ArduSub too.
     known = {}
     if out is not None and out.exists():
         known = {one["key"]: one for one in map(json.loads, out.read_text(encoding="utf-8").splitlines())}
-    flown = []
+    results = []
     for task in tasks:
         result = known.get(task.key)
         if result is None:
@@ -236,12 +206,13 @@ def make_flights(
             if out is not None and result["status"] and not result["status"].startswith("failed"):
                 with out.open("a", encoding="utf-8") as file:
                     file.write(line + "\n")
-        flown.append(result)
-    judged = [one for one in flown if "violated" in one and "entered" in one]
-    least = min((one["least"] for one in judged if one["least"] is not None), default=math.nan)
+        results.append(result)
+    evaluated = [one for one in results if "violated" in one and "entered" in one]
+    clearances = [one["min_clearance"] if "min_clearance" in one else one["least"] for one in evaluated]  # former name
+    minimum = min((clearance for clearance in clearances if clearance is not None), default=math.nan)
     print(
-        f"{len(flown)} flights: {sum(one.get('reached', False) for one in flown)} reached, "
-        f"{sum(one.get('stayed', False) for one in flown)} stayed, {sum(bool(one['violated']) for one in judged)} "
-        f"violated; least clearance {least:.3f} m",
+        f"{len(results)} flights: {sum(one.get('reached', False) for one in results)} reached, "
+        f"{sum(one.get('stayed', False) for one in results)} stayed, {sum(bool(one['violated']) for one in evaluated)} "
+        f"violated; minimum clearance {minimum:.3f} m",
         file=sys.stderr,
     )

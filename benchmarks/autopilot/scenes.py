@@ -17,19 +17,9 @@ _MOST_DRAWS = 1000  # draws of an obstacle, after which it is left out
 
 
 def random_scene(seed: int) -> Scenario:
-    """Make a random scene.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of the random numbers, 0 or above.
-
-    Returns
-    -------
-    Scenario
-        Scene with up to 30 spheres of radius 0.3 m to 0.9 m, a goal 8 m to 12 m ahead, a current of up to 0.4 m/s, and
-        a vehicle that is up to 15 N too light or too heavy. Its DVL measures 8 times a second with a noise of 0.01 m/s.
-    """
+    """Make a random scene: spheres, a current, and a vehicle that is too light or too heavy."""
+    # up to 30 spheres of radius 0.3 m to 0.9 m, a goal 8 m to 12 m ahead, a current of up to 0.4 m/s, |W - B| up to
+    # 15 N; the DVL measures 8 times a second with a noise of 0.01 m/s
     rng = np.random.default_rng([20261125, seed])
     start = np.array([0.0, 0.0, rng.uniform(1.5, 4.0)])
     goal = np.array([rng.uniform(8.0, 12.0), rng.uniform(-3.0, 3.0), rng.uniform(1.5, 4.5)])

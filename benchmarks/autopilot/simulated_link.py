@@ -20,39 +20,19 @@ _READ_EVERY = 0.004  # s, period of reading the autopilot's port
 
 
 class SimulatedLink:
-    """The companion's link in the plant's time: waiting for a message advances plant and autopilot.
-
-    Parameters
-    ----------
-    flights : SitlSession
-        Runs of the plant.
-    server : JsonServer
-        Server that answers the autopilot's frames.
-    endpoint : str
-        Endpoint of the autopilot's MAVLink port.
-
-    Attributes
-    ----------
-    cut : bool
-        True if all messages in both directions are lost.
-    lost : set of str
-        Names of messages that are lost in both directions.
-    others : GroundLink, optional
-        Link of a pilot's station to the autopilot.
-    events : list of (float, callable)
-        Times [s] and functions to call at them, in the order of time.
-    """
+    """The companion's link in the plant's time: waiting for a message advances plant and autopilot."""
 
     def __init__(self, flights: SitlSession, server: JsonServer, endpoint: str) -> None:
         self._flights, self._server = flights, server
         self._link = GroundLink(parse_endpoint(endpoint), identity=COMPANION)
         self.name, self.identity = endpoint, COMPANION
-        self.cut, self.lost = False, set[str]()
-        self.others: GroundLink | None = None
+        self.cut = False  # True: all messages in both directions are lost
+        self.lost = set[str]()  # names of messages that are lost in both directions
+        self.others: GroundLink | None = None  # link of a pilot's station to the autopilot
         self._up: deque[tuple[float, Any]] = deque()
         self._down: deque[ReceivedMessage] = deque()
         self._read_at = -math.inf
-        self.events: list[tuple[float, Callable[[], None]]] = []
+        self.events: list[tuple[float, Callable[[], None]]] = []  # times [s] in order, and functions to call
 
     def clock(self) -> float:
         """Return the plant's time since the autopilot's first frame [s]."""

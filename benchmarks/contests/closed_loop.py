@@ -121,19 +121,7 @@ class _Runs:
 
 
 def flights(*, per_run: bool = True, changes: Sequence[str] = (), batch: int = BATCH, whole: bool = False) -> Entry:
-    """Return the entry of the fused loop, which runs the scenario from many starts.
-
-    Parameters
-    ----------
-    per_run : bool
-        True if an item is a run, False if it is a step.
-    changes : sequence of str
-        Changes of the scenario, after `CHANGES`.
-    batch : int
-        Least number of concurrent runs.
-    whole : bool
-        True if an item is a batch; it takes precedence over `per_run`.
-    """
+    """Return the entry of the fused loop from many starts; an item is a run, a step, or a `whole` batch."""
 
     def entry(stack: ExitStack) -> Contestant:
         scenario = load_scenario(SCENARIO, [*CHANGES, f"time.duration={RUN}", *changes])
@@ -144,17 +132,7 @@ def flights(*, per_run: bool = True, changes: Sequence[str] = (), batch: int = B
 
 
 class _Flights:
-    """Runs, each from its own start; times are scaled to the number of items.
-
-    Parameters
-    ----------
-    flyer : FusedFlyer
-        Flies the runs.
-    batch : int
-        Least number of concurrent runs.
-    items : float
-        Items in a run.
-    """
+    """Runs, each from its own start; times are scaled to the number of items in a run."""
 
     def __init__(self, flyer: FusedFlyer, batch: int, items: float) -> None:
         self._flyer, self._batch, self._items = flyer, batch, items

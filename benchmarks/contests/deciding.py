@@ -13,7 +13,7 @@ from benchmarks.contest import Contest, Entry
 from benchmarks.law import LawSteps
 from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import peer
-from benchmarks.timing import Contestant, Own
+from benchmarks.timing import Contestant, InProcess
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.criteria import SECTION_VI
 
@@ -63,15 +63,7 @@ def contests(environment: Environment) -> Iterator[Contest]:
 
 
 class _Decisions:
-    """Decisions with new inputs each time: some engines cache their last results.
-
-    Parameters
-    ----------
-    decide : callable
-        Function of the inputs to time.
-    made : callable
-        Function that converts a row of inputs to the argument of `decide`.
-    """
+    """Decisions with new inputs each time: some engines cache their last results."""
 
     def __init__(self, decide: Callable[[Any], object], made: Callable[[list[float]], Any] = list) -> None:
         self._decide, self._made, self._rng = decide, made, np.random.default_rng(0)
@@ -96,7 +88,7 @@ def _compiled(_: ExitStack) -> Contestant:
 
 def _batch(_: ExitStack) -> Contestant:
     arbiter, rng = Arbiter(engine="closed"), np.random.default_rng(0)
-    return Own(lambda count: arbiter.batch(rng.random((count, len(SECTION_VI)))))
+    return InProcess(lambda count: arbiter.batch(rng.random((count, len(SECTION_VI)))))
 
 
 def _library(environment: Environment, library: str) -> Callable[[ExitStack], Contestant]:

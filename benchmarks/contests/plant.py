@@ -10,7 +10,7 @@ from benchmarks.c_loop import c_loop
 from benchmarks.contest import Contest, Entry
 from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import peer
-from benchmarks.timing import Contestant, Own, each
+from benchmarks.timing import Contestant, InProcess, repeat_call
 from benchmarks.vehicle_numbers import vehicle_numbers
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
@@ -69,14 +69,14 @@ def _plant(fmi: int) -> Entry:
             plant.step(STEP)
             plant.read_flags()
 
-        return Own(each(step))
+        return InProcess(repeat_call(step))
 
     return entry
 
 
 def _in_c(*, step_only: bool) -> Entry:
     path = cached_fmu(load_vehicle(VEHICLE), 3)
-    return lambda stack: Own(stack.enter_context(c_loop(path, START, STEP, step_only=step_only)))
+    return lambda stack: InProcess(stack.enter_context(c_loop(path, START, STEP, step_only=step_only)))
 
 
 def _fmpy(environment: Environment, function: str, fmi: int) -> Entry:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from benchmarks.contest import Contest
 from benchmarks.peer_environment import Environment
-from benchmarks.timing import Contestant, NotMeasuredError, Own, each
+from benchmarks.timing import Contestant, InProcess, NotMeasuredError, repeat_call
 
 RUN = ("run", "paper", "--set", "arbiter.engine=closed")
 _ROOT = Path(__file__).parents[2]
@@ -23,8 +23,8 @@ def contests(environment: Environment) -> Iterator[Contest]:
     """Yield the contests of the start."""
     yield Contest(
         "A start of the command",
-        {"cosim --help": lambda stack: Own(each(_Command(stack, ["-m", "cosim", "--help"])))},
-        {"fmpy --help": lambda _: Own(each(_plain([environment.python("fmpy"), "-m", "fmpy", "--help"])))},
+        {"cosim --help": lambda stack: InProcess(repeat_call(_Command(stack, ["-m", "cosim", "--help"])))},
+        {"fmpy --help": lambda _: InProcess(repeat_call(_plain([environment.python("fmpy"), "-m", "fmpy", "--help"])))},
         count=1,
         pinned=False,
     )
@@ -45,13 +45,13 @@ def _first(stack: ExitStack) -> Contestant:
         command()
 
     command.empty()
-    return Own(each(work))
+    return InProcess(repeat_call(work))
 
 
 def _second(stack: ExitStack) -> Contestant:
     command = _Command(stack, ["-m", "cosim", *RUN])
     command()
-    return Own(each(command))
+    return InProcess(repeat_call(command))
 
 
 class _Command:

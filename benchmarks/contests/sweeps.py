@@ -20,15 +20,7 @@ _WARMING = 64  # rows per worker, of each of two sweeps before the timing
 
 
 def sweep(pool: str, workers: int) -> Entry:
-    """Return the entry of a sweep, whose items are runs; the time includes its folder and summary.
-
-    Parameters
-    ----------
-    pool : str
-        ``"processes"`` or ``"Dask"``.
-    workers : int
-        Number of workers.
-    """
+    """Return the entry of a sweep by ``processes`` or ``Dask``, whose items are runs; with its folder and summary."""
 
     def entry(stack: ExitStack) -> Contestant:
         contestant = _Sweep(stack.enter_context(_executor(pool, workers)), workers, stack)

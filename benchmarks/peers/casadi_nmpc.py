@@ -86,12 +86,12 @@ def controller(setup: dict[str, Any]) -> Callable[[dict[str, Any]], dict[str, An
             planes=_all_planes(given, setup),
         )
         before = time.perf_counter()
-        found, success = program.solve(plan)
+        solution, success = program.solve(plan)
         taken = time.perf_counter() - before
-        if not np.isfinite(found).all():
-            found, success = plan, False
-        forces = np.clip(program.first_inputs(found) * vehicle["scale"], vehicle["least"], vehicle["most"])
-        plan = program.shifted(found, setup["period"] / given["weights"]["interval"])
+        if not np.isfinite(solution).all():
+            solution, success = plan, False
+        forces = np.clip(program.first_inputs(solution) * vehicle["scale"], vehicle["least"], vehicle["most"])
+        plan = program.shifted(solution, setup["period"] / given["weights"]["interval"])
         return {
             "forces": forces.tolist(), "success": success, "path": program.positions(plan).tolist(), "seconds": taken,
         }  # fmt: skip
@@ -100,13 +100,7 @@ def controller(setup: dict[str, Any]) -> Callable[[dict[str, Any]], dict[str, An
 
 
 class _Program:
-    """The compiled nonlinear program, with the arrays of its arguments.
-
-    Parameters
-    ----------
-    setup : dict
-        Setup of `controller`.
-    """
+    """The compiled nonlinear program, with the arrays of its arguments."""
 
     def __init__(self, setup: dict[str, Any]) -> None:
         self._stages, n = setup["stages"], setup["obstacles"]
@@ -304,8 +298,8 @@ def _nearest(spheres: list[list[float]], position: list[float], count: int) -> n
 
 def _all_planes(given: dict[str, Any], setup: dict[str, Any]) -> np.ndarray:
     """Return the planes of all stages, hard ones first in each, shape (4, stages * n)."""
-    found = np.tile(np.array(_NO_PLANE), (setup["stages"], setup["hard"] + setup["soft"], 1))
+    planes = np.tile(np.array(_NO_PLANE), (setup["stages"], setup["hard"] + setup["soft"], 1))
     for first, kind in ((0, "hard"), (setup["hard"], "soft")):
         for i, plane in enumerate(given[kind][: setup[kind]]):
-            found[:, first + i] = plane
-    return found.reshape(-1, 4).T
+            planes[:, first + i] = plane
+    return planes.reshape(-1, 4).T

@@ -13,15 +13,15 @@ from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
 _TICKS = 10**9  # ticks per second: libcosim counts time in nanoseconds
 
 
-def _unpacked(setup: dict[str, Any]) -> str:
-    """Return the folder of the unpacked system structure, the input of libcosim."""
-    folder = tempfile.mkdtemp()
+def _unpack_ssp(setup: dict[str, Any]) -> tempfile.TemporaryDirectory[str]:
+    """Unpack the system structure into a folder, the input of libcosim, which exists as long as the result."""
+    folder = tempfile.TemporaryDirectory()
     with zipfile.ZipFile(setup["ssp"]) as archive:
-        archive.extractall(folder)
+        archive.extractall(folder.name)
     return folder
 
 
-def _opened(folder: str, setup: dict[str, Any]) -> Any:
+def _open_execution(folder: str, setup: dict[str, Any]) -> Any:
     log_output_level(CosimLogLevel.ERROR)
     return CosimExecution.from_ssp_file(folder, round(setup["step"] * _TICKS))
 
@@ -33,16 +33,17 @@ def _step(execution: Any, count: int) -> None:
 
 def steps(setup: dict[str, Any]) -> Callable[[int], object]:
     """Return a function that runs a given number of steps in one call."""
-    execution = _opened(_unpacked(setup), setup)
-    return lambda count: _step(execution, count)
+    folder = _unpack_ssp(setup)
+    execution = _open_execution(folder.name, setup)
+    return lambda count, _=folder: _step(execution, count)  # type: ignore[misc]
 
 
 def runs(setup: dict[str, Any]) -> Callable[[int], object]:
     """Return a function that makes a given number of whole runs, each with loading, from unpacked files."""
-    folder, whole = _unpacked(setup), round(setup["duration"] / setup["step"])
+    folder, whole = _unpack_ssp(setup), round(setup["duration"] / setup["step"])
 
     def work(count: int) -> None:
         for _ in range(count):
-            _step(_opened(folder, setup), whole)
+            _step(_open_execution(folder.name, setup), whole)
 
     return work

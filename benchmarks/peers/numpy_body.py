@@ -25,18 +25,7 @@ def coriolis(momentum: Array) -> Array:
 
 
 class Body:
-    """A rigid body in still water, without lag of the thrusters.
-
-    Parameters
-    ----------
-    numbers : dict
-        Numbers of the vehicle, from `benchmarks.vehicle_numbers`.
-
-    Attributes
-    ----------
-    state : ndarray, shape (13,)
-        Position [m, NED], quaternion from body to world, velocity [m/s, rad/s, body frame].
-    """
+    """A rigid body in still water, without lag of the thrusters."""
 
     def __init__(self, numbers: dict[str, Any]) -> None:
         v = {key: np.array(value) for key, value in numbers.items()}
@@ -47,6 +36,7 @@ class Body:
         self.arm = v["r_G"] * v["weight"] - v["r_B"] * v["buoyancy"]
         self.linear, self.quadratic = v["linear_damping"], v["quadratic_damping"]
         self.thruster_matrix, self.thrust_min, self.thrust_max = v["thruster_matrix"], v["thrust_min"], v["thrust_max"]
+        # position [m, NED], quaternion from body to world, velocity [m/s, rad/s, body frame]
         self.state = np.zeros(13)
         self.state[3] = 1.0
 

@@ -10,8 +10,8 @@ import msgspec
 import numpy as np
 
 from cosim.campaigns.analysis.campaign_summary import rates_of
-from cosim.campaigns.analysis.statistics import Facts, mean_ratio, median_difference, paired, rate
-from cosim.campaigns.comparison import Comparison, completed, fly_each, refuse_other_files
+from cosim.campaigns.analysis.statistics import Facts, count_pairs, mean_ratio, median_difference, rate
+from cosim.campaigns.comparison import Comparison, completed_scenes, fly_each, refuse_other_files
 from cosim.campaigns.runner import Campaign
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.kinds import scene_kinds
@@ -101,7 +101,7 @@ def _compare(whole: Results, results: Results) -> dict[str, Any]:
 
 def _numbers(whole: Results, results: Results, rows: Facts) -> dict[str, Any]:
     """Compare on some scenes; ratios and differences are of the whole law to this variant."""
-    by_whole, by_variant = completed(whole)[rows], completed(results)[rows]
+    by_whole, by_variant = completed_scenes(whole)[rows], completed_scenes(results)[rows]
 
     def columns(name: str) -> tuple[Array, Array]:
         return whole.number(name)[rows], results.number(name)[rows]
@@ -110,7 +110,7 @@ def _numbers(whole: Results, results: Results, rows: Facts) -> dict[str, Any]:
     return {
         "scenes": int(rows.sum()),
         **{name: rate(happened[rows]) for name, happened in rates_of(results).items()},
-        "paired": paired(by_whole, by_variant),
+        "paired": count_pairs(by_whole, by_variant),
         "weighted_violation": mean_ratio(*columns("weighted_violation")),
         "reach_time": median_difference((times[0] - times[1])[by_whole & by_variant]),
         "thrust_variation": mean_ratio(*columns("thrust_variation")),

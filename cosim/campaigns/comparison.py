@@ -12,13 +12,13 @@ import numpy as np
 
 from controller import LAWS
 from cosim.campaigns.analysis.campaign_summary import median, rates_of
-from cosim.campaigns.analysis.statistics import Facts, median_difference, paired
+from cosim.campaigns.analysis.statistics import Facts, count_pairs, median_difference
 from cosim.campaigns.campaign import run_campaign
 from cosim.campaigns.pages.comparison_page import NUMBERS, PAGE
 from cosim.campaigns.pages.replays import WORST
 from cosim.campaigns.runner import Campaign
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.law_gains import gains_from, law_named
+from cosim.campaigns.scenes.law_gains import gains_from, law_class
 from cosim.campaigns.scenes.scene_file import SceneStore
 from cosim.campaigns.scenes.scene_work import SceneTask
 from cosim.campaigns.store.results import Results
@@ -98,7 +98,7 @@ def compare(
     ['pd', 'sun_cheah']
     """
     for law in laws:
-        law_named(law)
+        law_class(law)
     if len(laws) < 2 or len(set(laws)) < len(laws):
         raise RunError(f"laws are {', '.join(laws) or 'none'}, expected two or more, each once")
     out, gains, conditions = Path(out), gains or {}, conditions or Conditions()
@@ -141,12 +141,12 @@ def fly_each(
 
 def medians_where_completed(one: str, other: str, results: Mapping[str, Results]) -> dict[str, Any]:
     """Compare two laws on the scenes that the first of them completes without a violation."""
-    rows = completed(results[one])
+    rows = completed_scenes(results[one])
     return {
         "completed_by": one,
         "scenes": int(rows.sum()),
         "beside": other,
-        "completed_by_both": int((rows & completed(results[other])).sum()),
+        "completed_by_both": int((rows & completed_scenes(results[other])).sum()),
         "reach_time": {law: median(results[law].number("reach_time", missing=np.inf)[rows]) for law in (one, other)},
         "effort": {law: median(results[law].number("effort")[rows]) for law in (one, other)},
     }
@@ -154,11 +154,11 @@ def medians_where_completed(one: str, other: str, results: Mapping[str, Results]
 
 def paired_differences(one: str, other: str, results: Mapping[str, Results]) -> dict[str, Any]:
     """Compare two laws scene by scene."""
-    by_one, by_other = completed(results[one]), completed(results[other])
+    by_one, by_other = completed_scenes(results[one]), completed_scenes(results[other])
     both = by_one & by_other
     return {
         "laws": [one, other],
-        **paired(by_one, by_other),
+        **count_pairs(by_one, by_other),
         "differences": {
             name: median_difference((results[one].number(name) - results[other].number(name))[both])
             for name in ("reach_time", "effort")
@@ -166,7 +166,7 @@ def paired_differences(one: str, other: str, results: Mapping[str, Results]) -> 
     }
 
 
-def completed(results: Results) -> Facts:
+def completed_scenes(results: Results) -> Facts:
     """Return a mask of the scenes that were reached without a violation, shape (scenes,)."""
     return rates_of(results)["completed"]
 

@@ -16,7 +16,7 @@ from controller import ControllerError
 from controller.regions.region_set import of_attitude
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.law_gains import law_named
+from cosim.campaigns.scenes.law_gains import law_class
 from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.scene_rows import SCHEMA
 from cosim.campaigns.scenes.scene_work import SceneTask
@@ -122,7 +122,7 @@ def _sweep_repeat(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) ->
 
 
 def _scene_repeat(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
-    gains = law_named(plan["law"]).gains_type(**plan["gains"])
+    gains = law_class(plan["law"]).gains_type(**plan["gains"])
     conditions: Conditions = decode(plan["conditions"], Conditions, "conditions")
     line = stored["scene"].encode()
     scenario = None

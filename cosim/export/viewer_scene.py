@@ -12,7 +12,7 @@ from controller.regions.region_set import SHAPES, shape_entry, surface_of
 from controller.regions.shape import Bounds, Shape
 from cosim.export.excerpt import Excerpt
 from cosim.replay.header import header_of
-from cosim.replay.region_changes import changes_of, log_of
+from cosim.replay.region_changes import list_region_changes, read_command_log
 from cosim.results.region_colors import colors_of_regions
 from cosim.simulation.signals import Array
 
@@ -66,9 +66,9 @@ class Scene:
             Thruster(np.array(t["position"]), np.array(t["direction"]), max(abs(t["min"]), abs(t["max"])))
             for t in vehicle["thrusters"]
         )
-        self.log = log_of(excerpt.run)
+        self.log = read_command_log(excerpt.run)
         at_start = [excerpt.run.planned.goal, *(r.region.shape for r in scenario.regions)]
-        later = [(c["time"], c["region"], _shape(c["shape"])) for c in changes_of(excerpt.run, self.log)]
+        later = [(c["time"], c["region"], _shape(c["shape"])) for c in list_region_changes(excerpt.run, self.log)]
         # the shapes of free obstacle slots are at the parked position, far away
         waiting = {i + 1 for i, secondary in enumerate(scenario.regions) if secondary.is_dynamic}
         waiting |= set() if scenario.has_goal else {0}

@@ -32,10 +32,10 @@ def command_events(log: Sequence[tuple[int, cmd.Command]], step: float, max_mome
     words: dict[int, list[str]] = {k: [] for k in begins}
     for k, command in log:
         words[begins[bisect_right(begins, k) - 1]].append(command_words(command))
-    return [(k * step, _joined(of_moment)) for k, of_moment in words.items()]
+    return [(k * step, _join_words(of_moment)) for k, of_moment in words.items()]
 
 
-def _joined(words: Sequence[str]) -> str:
+def _join_words(words: Sequence[str]) -> str:
     kinds = list(dict.fromkeys(words))  # the texts of sticks repeat
     more = f"; {len(kinds) - _LISTED} more commands" if len(kinds) > _LISTED else ""
     return "Commanded: " + "; ".join(kinds[:_LISTED]) + more
@@ -50,7 +50,7 @@ def command_words(command: cmd.Command) -> str:
             return _MODES[command.mode]
         case cmd.SetTarget():
             size = "" if command.radius is None else f", radius {command.radius:.3g} m"
-            return f"Target at {_place(command.position)}{size}"
+            return f"Target at {_format_position(command.position)}{size}"
         case cmd.SetHeading():
             return f"Heading {math.degrees(command.heading) % 360.0:.0f}°"
         case cmd.ManualControl():
@@ -58,11 +58,11 @@ def command_words(command: cmd.Command) -> str:
         case cmd.SetAttitude():
             return "Attitude given" if command.quaternion is not None else "Attitude free"
         case cmd.AddObstacle():
-            return f"Obstacle {command.number} at {_place(command.position)}, radius {command.radius:.3g} m"
+            return f"Obstacle {command.number} at {_format_position(command.position)}, radius {command.radius:.3g} m"
         case cmd.RemoveObstacle():
             return f"Obstacle {command.number} gone"
         case cmd.ShiftRegion():
-            return f"{command.region} moved by {_place(command.by)}"
+            return f"{command.region} moved by {_format_position(command.by)}"
         case cmd.ChangeSetting():
             return f"{command.key} is {command.value:.6g}"
         case cmd.SetMission():
@@ -75,5 +75,5 @@ def command_words(command: cmd.Command) -> str:
             assert_never(command)
 
 
-def _place(position: Vector3) -> str:
+def _format_position(position: Vector3) -> str:
     return "(" + ", ".join(f"{x:.3g}" for x in position) + ") m"

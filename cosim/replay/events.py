@@ -217,11 +217,11 @@ def _join(spans: Sequence[Span], max_spans: int, apart: float) -> tuple[list[Spa
 def _longest_changes(changes: Iterator[tuple[float, int]]) -> list[tuple[float, int]]:
     """Return at most `_MAX_EVENTS` changes, those after which the region stays active longest."""
     longest = heapq.nsmallest(_MAX_EVENTS, _changes_with_duration(changes))
-    found: list[tuple[float, int]] = []
+    kept: list[tuple[float, int]] = []
     for _, time, active in sorted(longest, key=lambda change: change[1]):
-        if not found or active != found[-1][1]:
-            found.append((time, active))
-    return found
+        if not kept or active != kept[-1][1]:
+            kept.append((time, active))
+    return kept
 
 
 def _changes_with_duration(changes: Iterator[tuple[float, int]]) -> Iterator[tuple[float, float, int]]:

@@ -24,7 +24,7 @@ _PLAYER = (
 _LIVE = ("things.js", "ghost.js", "dragging.js", "fields.js", "command_panel.js", "live.js")
 _FLYING = ("flight.js", "outcome.js", "saving.js", "what_if_panel.js", "what_if.js")
 _SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, *_LIVE, *_FLYING, "main.js")
-_WORKER = "flier.js"
+_WORKER = "flight_worker.js"
 _STYLES = ("style.css", "stage.css", "charts.css", "panel.css", "transport.css", "layout.css", "live.css")
 
 _COMMENT = re.compile(
@@ -42,16 +42,12 @@ def replay_page(runs: Sequence[dict[str, Any]], title: str, flight: dict[str, An
         for names in (_STYLES, _SCRIPTS)
     )
     worker = _COMMENT.sub("", (assets / _WORKER).read_text(encoding="utf-8")) if flight else ""
-    return (
-        make_environment()
-        .get_template("cosim.replay/assets/page.html.j2")
-        .render(
-            title=title, style=style, runs=_embedded(list(runs)), flight=_embedded(flight), flier=worker, script=script
-        )
-    )
+    template = make_environment().get_template("cosim.replay/assets/page.html.j2")
+    data = {"runs": _embed_json(list(runs)), "flight": _embed_json(flight)}
+    return template.render(title=title, style=style, worker=worker, script=script, **data)
 
 
-def _embedded(data: Any) -> str:
+def _embed_json(data: Any) -> str:
     """Format data as JSON for a script element, with every "<" escaped: "</script" or "<!--" would change its end."""
     text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
     return text.replace("<", "\\u003c")

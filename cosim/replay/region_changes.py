@@ -35,30 +35,30 @@ from cosim.simulation.signals import Array
 
 Log = Sequence[tuple[int, Command]]  # each command with the step at which it was applied
 
-_SAME = 1e-6  # m; closer radii of a record are equal up to rounding
+_RADIUS_TOLERANCE = 1e-6  # m; closer radii of a record are equal up to rounding
 
 
-def log_of(run: Run) -> Log:
+def read_command_log(run: Run) -> Log:
     """Read the log of commands of a run."""
     file = run.folder / COMMANDS_LOG
     return read_log(file) if run.scenario.commands.enabled and file.exists() else ()
 
 
-def changes_of(run: Run, log: Log) -> list[dict[str, Any]]:
+def list_region_changes(run: Run, log: Log) -> list[dict[str, Any]]:
     """List the changes of regions during a run, except their motion."""
     if not run.scenario.commands.enabled:
         return []
-    by_settings = _Changes(run).of(log)
+    by_settings = _ChangeReplay(run).iterate(log)
     by_obstacles = (
         change
         for i, secondary in enumerate(run.scenario.regions)
         if secondary.is_dynamic
-        for change in _sizes(run, i + 1, secondary)
+        for change in _radius_changes(run, i + 1, secondary)
     )
     return sorted([*by_settings, *by_obstacles], key=lambda change: change["time"])
 
 
-class _Changes:
+class _ChangeReplay:
     """Replay the commanded changes, immediate or by items of a mission, on its own settings."""
 
     def __init__(self, run: Run) -> None:
@@ -69,11 +69,11 @@ class _Changes:
         self._index = {"goal": 0, **{r.region.name: i + 1 for i, r in enumerate(run.scenario.regions)}}
         self._gains = [run.scenario.goal_region.gain, *(r.region.gain for r in run.scenario.regions)]
         self._last_row = len(run.record) - 1
-        self._changed_rows, self._values = _steps_of(run.record)
+        self._changed_rows, self._values = _change_rows(run.record)
         self._items: tuple[MissionItem, ...] = ()
         self._item = -1  # item of the mission whose commands were applied last
 
-    def of(self, log: Log) -> Iterator[dict[str, Any]]:
+    def iterate(self, log: Log) -> Iterator[dict[str, Any]]:
         """Yield the changes, step by step."""
         commanded = {k: [command for _, command in group] for k, group in groupby(log, key=lambda entry: entry[0])}
         for k in sorted({*commanded, *self._changed_rows.tolist()}):
@@ -82,16 +82,16 @@ class _Changes:
             row = min(k, self._last_row)
             radius, in_mission, item = self._at_row(row)
             by_mission = self._by_mission(commands, int(item) if in_mission else None)
-            touched = {name for command in (*commands, *by_mission) if (name := self._apply(command))}
+            changed_regions = {name for command in (*commands, *by_mission) if (name := self._apply(command))}
             if radius != self._at_row(row - 1)[0] if row else radius > 0.0:
-                touched.add("goal")
-            for name in sorted(touched, key=self._index.__getitem__):
-                yield self._change(name, k, float(radius))
+                changed_regions.add("goal")
+            for name in sorted(changed_regions, key=self._index.__getitem__):
+                yield self._region_change(name, k, float(radius))
 
     def _at_row(self, row: int) -> Array:
         """Return the target's radius, 1 or 0 for a mission, and its item, shape (3,)."""
-        found: Array = self._values[np.searchsorted(self._changed_rows, row, "right") - 1]
-        return found
+        values: Array = self._values[np.searchsorted(self._changed_rows, row, "right") - 1]
+        return values
 
     def _by_mission(self, commands: Iterable[Command], now: int | None) -> Iterator[Command]:
         """Yield the commands of the items that start in a step; `now` is the item, None outside a mission."""
@@ -121,25 +121,25 @@ class _Changes:
             return region
         return None
 
-    def _change(self, name: str, k: int, target_radius: float) -> dict[str, Any]:
+    def _region_change(self, name: str, k: int, target_radius: float) -> dict[str, Any]:
         shape: Shape = self._settings.shapes[name]
         if name == "goal" and target_radius > 0.0:
             shape = Sphere(self._center, target_radius)
-        return _changed(k * self._step, self._index[name], shape, self._gains[self._index[name]], self._limits)
+        return _change_record(k * self._step, self._index[name], shape, self._gains[self._index[name]], self._limits)
 
 
-def _sizes(run: Run, index: int, secondary: SecondaryRegion) -> Iterator[dict[str, Any]]:
+def _radius_changes(run: Run, index: int, secondary: SecondaryRegion) -> Iterator[dict[str, Any]]:
     """Yield the changes of an obstacle's radius."""
     before, limits = -np.inf, limits_of(run.scenario)
     for times, radii in radii_of(run.record, secondary.region.name):
-        fresh = np.abs(np.diff(radii, prepend=before)) > _SAME
+        fresh = np.abs(np.diff(radii, prepend=before)) > _RADIUS_TOLERANCE
         for time, radius in zip(times[fresh], radii[fresh], strict=True):
-            obstacle = Sphere(PARKED_POSITION, max(float(radius), _SAME))
-            yield _changed(float(time), index, obstacle, secondary.region.gain, limits)
+            obstacle = Sphere(PARKED_POSITION, max(float(radius), _RADIUS_TOLERANCE))
+            yield _change_record(float(time), index, obstacle, secondary.region.gain, limits)
         before = radii[-1] if radii.size else before
 
 
-def _steps_of(record: Rows) -> tuple[NDArray[np.intp], Array]:
+def _change_rows(record: Rows) -> tuple[NDArray[np.intp], Array]:
     """Return the rows at which target or mission change, with the first, and their new values, shape (n, 3)."""
     first, rows, values, before = 0, [], [], np.full((1, 3), np.nan)
     for block in record.blocks(["target.radius", "commands.mode", "commands.item"]):
@@ -153,5 +153,5 @@ def _steps_of(record: Rows) -> tuple[NDArray[np.intp], Array]:
     return np.concatenate(rows), np.concatenate(values)
 
 
-def _changed(time: float, index: int, shape: Shape, gain: float, limits: Bounds) -> dict[str, Any]:
+def _change_record(time: float, index: int, shape: Shape, gain: float, limits: Bounds) -> dict[str, Any]:
     return {"time": time, "region": index, "shape": shape_of(shape, limits), "gain": gain}

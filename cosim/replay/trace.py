@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cosim.io.strict_json import nan_to_none
 from cosim.replay.events import events_of
 from cosim.replay.header import header_of
-from cosim.replay.region_changes import changes_of, log_of
+from cosim.replay.region_changes import list_region_changes, read_command_log
 from cosim.replay.sampling import MAX_BYTES, sampled_rows
 from cosim.replay.view_columns import ViewColumns
 from cosim.results.extremes import rows_at
@@ -50,8 +50,8 @@ def trace_of(run: Run, max_bytes: int = MAX_BYTES) -> Trace:
     """Make the trace of a run."""
     scenario, record, summary = run.scenario, run.record, run.summary
     view_columns = ViewColumns(scenario, record.columns)
-    log = log_of(run)
-    changes, events = changes_of(run, log), events_of(run, log)
+    log = read_command_log(run)
+    changes, events = list_region_changes(run, log), events_of(run, log)
     times = [t for event in events for t in (event.time, event.until) if t is not None]
     event_rows = rows_at(record, [*(change["time"] for change in changes), *times])
     clearances = ["goal.clearance", *(f"{secondary.region.name}.clearance" for secondary in scenario.regions)]

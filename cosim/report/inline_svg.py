@@ -31,11 +31,11 @@ def dark_color(color: str) -> str:
     """Return the color for a dark ground: grays from white to black change places, hues are lightened."""
     r, g, b = (int(color[i : i + 2], 16) for i in (1, 3, 5))
     if max(r, g, b) - min(r, g, b) < _GRAY:
-        return _mixed(_DARK_INK, DARK_GROUND, (r + g + b) / 765.0)
+        return _mix(_DARK_INK, DARK_GROUND, (r + g + b) / 765.0)
     part, mixed = 0.0, color
-    while contrast(mixed, _mixed(DARK_GROUND, DARK_GROUND, 0.0)) < _CONTRAST:
+    while contrast(mixed, _mix(DARK_GROUND, DARK_GROUND, 0.0)) < _CONTRAST:
         part += 0.05
-        mixed = _mixed((r, g, b), (255, 255, 255), part)
+        mixed = _mix((r, g, b), (255, 255, 255), part)
     return mixed
 
 
@@ -51,7 +51,7 @@ def _luminance(color: str) -> float:
     return 0.2126 * r + 0.7152 * g + 0.0722 * b
 
 
-def _mixed(one: _Rgb, other: _Rgb, part: float) -> str:
+def _mix(one: _Rgb, other: _Rgb, part: float) -> str:
     return "#" + "".join(f"{round(a + part * (b - a)):02x}" for a, b in zip(one, other, strict=True))
 
 

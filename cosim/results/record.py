@@ -115,7 +115,7 @@ class Record(Rows):
 
     def __init__(self, file: Path) -> None:
         self.file = file
-        with _opened(file, warn=True) as source:
+        with _open_source(file, warn=True) as source:
             self._count = sum(source.group_rows)
             _require_numbers(file, source.schema, self._count)
             if (format_number := _format_of(source.schema)) is not None:
@@ -170,7 +170,7 @@ class Record(Rows):
 
     def _batches(self, columns: Sequence[Column]) -> Iterator[Rows]:
         """Yield all rows in order, from the file."""
-        with _opened(self.file) as source:
+        with _open_source(self.file) as source:
             yield from source.read(columns, range(len(source.group_rows)))
 
     def take(self, rows: Sequence[int] | NDArray[np.intp], names: Sequence[str] | None = None) -> Rows:
@@ -180,7 +180,7 @@ class Record(Rows):
         columns, rows = self._columns_of(names), np.asarray(rows, np.intp)
         pieces: dict[str, list[Array]] = {column.name: [np.empty(0)] for column in columns}
         first = 0
-        with _opened(self.file) as source:
+        with _open_source(self.file) as source:
             for group, length in enumerate(source.group_rows):
                 if np.searchsorted(rows, first) == np.searchsorted(rows, first + length):
                     first += length
@@ -261,7 +261,7 @@ def _numbers(column: pa.Array) -> Array:
 
 
 @contextlib.contextmanager
-def _opened(file: Path, warn: bool = False) -> Iterator[_Source]:
+def _open_source(file: Path, warn: bool = False) -> Iterator[_Source]:
     """Open the file of a record; convert all errors of reading it to a RunError."""
     require_utf8(file)
     try:

@@ -19,13 +19,13 @@ _NAMED = 3  # maximum number of columns named in a message
 
 def require_columns(scenario: Scenario, record: Record) -> None:
     """Raise a RunError if a record lacks columns of its scenario; log a warning if it lacks optional ones."""
-    expected, found = column_names(scenario), list(record.units)
+    expected, present = column_names(scenario), list(record.units)
     missing = [name for name in expected if name not in record.units]
     required = [name for name in missing if not _is_optional(name)]
     if required:
         raise RunError(f"{record.file}: has no {_list_names(required)}, which its scenario calls for")
     # code that reads neighboring columns, or the first one, relies on the order
-    here = [found[0], *(name for name in found if name in expected)]
+    here = [present[0], *(name for name in present if name in expected)]
     there = [expected[0], *(name for name in expected if name in record.units)]
     odd = next((name for name, other in zip(here, there, strict=True) if name != other), None)
     if odd is not None:

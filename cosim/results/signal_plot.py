@@ -37,7 +37,9 @@ def plot_signals(record: Record, patterns: Sequence[str], title: str, ax: Any) -
     elif len(by_unit) == 1:
         column = [ax]
     else:
-        raise RunError(f"ax is given for signals in {' and '.join(map(_shown, by_unit))}, expected one unit, or no ax")
+        raise RunError(
+            f"ax is given for signals in {' and '.join(map(_format_unit, by_unit))}, expected one unit, or no ax"
+        )
     for axes, (unit, names_of_unit) in zip(column, by_unit.items(), strict=True):
         for name in names_of_unit:
             axes.plot(record["time"], record[name], label=name)
@@ -45,15 +47,15 @@ def plot_signals(record: Record, patterns: Sequence[str], title: str, ax: Any) -
         axes.legend()
     column[-1].set_xlabel("time [s]")
     first = column[0]
-    first.set_title(_wrapped(title, first), fontsize="medium")
+    first.set_title(_wrap_title(title, first), fontsize="medium")
     return first
 
 
-def _shown(unit: str) -> str:
+def _format_unit(unit: str) -> str:
     return unit or "no unit"
 
 
-def _wrapped(title: str, axes: Any) -> str:
+def _wrap_title(title: str, axes: Any) -> str:
     """Break a title into lines that are no wider than the axes, which are as wide as their figure at most."""
     width = axes.get_window_extent().width / axes.figure.dpi * _POINTS
     size = axes.title.get_fontproperties().get_size_in_points()

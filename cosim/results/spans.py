@@ -49,6 +49,6 @@ class Spans:
 
 def spans(flags: Flags, time: Array) -> list[tuple[float, float]]:
     """Return the spans [s] in which a condition holds, each up to the first instant at which it no longer does."""
-    found = Spans()
-    ended = found.add(flags, time)
-    return [(span.start, span.end) for span in (*ended, *([found.open] if found.open else []))]
+    finder = Spans()
+    ended = finder.add(flags, time)
+    return [(span.start, span.end) for span in (*ended, *([finder.open] if finder.open else []))]

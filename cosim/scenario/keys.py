@@ -38,7 +38,7 @@ def _keys_of(kind: type[Table], path: str = "") -> Iterator[tuple[str, Key]]:
         table, listed = table_in(annotation)
         meta = next((meta for _, metas in types_in(annotation) for meta in metas if meta.extra), None)
         if meta is not None and meta.extra is not None:
-            words = meta.extra["default"] or _default(defaults[name])
+            words = meta.extra["default"] or _format_default(defaults[name])
             yield f"{path}{name}", Key(meta.extra["unit"], str(meta.description), meta.extra["more"], words)
         if table is not None:
             yield from _keys_of(table, f"{path}{name}{'[]' if listed else ''}.")
@@ -46,7 +46,7 @@ def _keys_of(kind: type[Table], path: str = "") -> Iterator[tuple[str, Key]]:
             yield from _keys_of(GoalMotion, "goal.")
 
 
-def _default(field: msgspec.structs.FieldInfo) -> str:
+def _format_default(field: msgspec.structs.FieldInfo) -> str:
     """Format the default of a key, in Markdown."""
     value = field.default if field.default_factory is msgspec.NODEFAULT else field.default_factory()
     if value is msgspec.NODEFAULT:
@@ -116,9 +116,13 @@ def unit_of_shape(kind: str, key: str) -> str:
 
 def comments(law: str, vehicle: Vehicle) -> dict[str, str]:
     """Return the comment for each key of a file: its unit and its meaning, as plain text."""
-    texts = {path: _comment(key.unit, _LINK.sub(r"\1", key.meaning).replace("`", "")) for path, key in KEYS.items()}
+    texts = {
+        path: _join_comment(key.unit, _LINK.sub(r"\1", key.meaning).replace("`", "")) for path, key in KEYS.items()
+    }
     texts |= {f"law.gains.{gain}": text for gain, text in _gain_comments(law).items()}
-    return texts | {f"plant.parameters.{v.name}": _comment(v.quantity.unit, v.description) for v in variables(vehicle)}
+    return texts | {
+        f"plant.parameters.{v.name}": _join_comment(v.quantity.unit, v.description) for v in variables(vehicle)
+    }
 
 
 @functools.cache
@@ -128,7 +132,7 @@ def unit_of_gain(law: str, gain: str) -> str:
     return unit[0] if unit else ""
 
 
-def _comment(unit: str, meaning: str) -> str:
+def _join_comment(unit: str, meaning: str) -> str:
     return ", ".join(filter(None, (unit, meaning)))
 
 

@@ -48,7 +48,7 @@ def test_what_a_build_compiles_imports_only_what_the_build_installs():
     program = re.search(r'_COMPILE = """(.*?)"""', (ROOT / "hatch_build.py").read_text(), re.S)[1].partition(
         "platforms"
     )[0]
-    installed = re.search(r"_NEEDED = \((.*?)\)", (ROOT / "hatch_build.py").read_text(), re.S)[1]
+    installed = re.search(r"_BUILD_REQUIREMENTS = \((.*?)\)", (ROOT / "hatch_build.py").read_text(), re.S)[1]
     ours = {"plant_fmu", "controller", "cosim", "fuzzy_arbiter"}
     missing = modules - ours - {name.replace("-", "_") for name in re.findall(r'"(.*?)"', installed)}
     blocked = f"import sys\nsys.modules |= dict.fromkeys({sorted(missing)!r})\n"

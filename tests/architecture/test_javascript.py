@@ -14,7 +14,7 @@ ASSETS = ROOT / "cosim" / "replay" / "assets"
 @pytest.mark.parametrize("scope", ["browser", "worker"])
 def test_names_are_defined(tmp_path, scope):
     script = tmp_path / "page.js"
-    files = [path for path in sorted(ASSETS.glob("*.js")) if (path.name == "flier.js") == (scope == "worker")]
+    files = [path for path in sorted(ASSETS.glob("*.js")) if (path.name == "flight_worker.js") == (scope == "worker")]
     script.write_text("\n".join(path.read_text() for path in files))
     rules = [
         f"--deny={rule}" for rule in ("no-undef", "no-const-assign", "no-redeclare", "no-dupe-keys", "no-unreachable")

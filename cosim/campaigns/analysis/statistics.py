@@ -92,7 +92,7 @@ def effect(values: Array, outcome: Array) -> dict[str, float] | None:
     return {"share": float(share), "floor": float(floor)}
 
 
-def paired(one: Facts, other: Facts) -> dict[str, Any]:
+def count_pairs(one: Facts, other: Facts) -> dict[str, Any]:
     """Count the scenes that both laws, only one, or none of them completes; one, other (n,)."""
     from scipy.stats import binomtest
 

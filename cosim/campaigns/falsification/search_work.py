@@ -89,7 +89,7 @@ class SceneSearch(Work):
         """Return the scenes of some rows, as lines of JSON."""
         return [self._lines[row] for row in rows]
 
-    def refused(self, row: int, reason: str) -> Any:
+    def refused_table(self, row: int, reason: str) -> Any:
         """Return the table of one scene that could not be flown."""
         return table_of([refused_row(row, reason, self._lines[row].decode().strip())])
 

@@ -29,7 +29,7 @@ def write_ablation_page(folder: Path, replays: int) -> Path:
         if not (isinstance(variants, dict) and WHOLE in variants and variants.keys() <= {WHOLE, *VARIANTS}):
             raise RunError(f"{folder / NUMBERS}: holds no ablation")
         results = {name: complete_results(folder / name, SCHEMA) for name in variants}
-        changed = _changed(results)[: max(LISTED, replays)]
+        changed = _largest_changes(results)[: max(LISTED, replays)]
         worse = [name for name, effect in variants.items() if name != WHOLE and _helps(effect)]
         return PageContents(
             {"changed": changed, "worse": worse, "same": [name for name in variants if name not in (WHOLE, *worse)]},
@@ -40,7 +40,7 @@ def write_ablation_page(folder: Path, replays: int) -> Path:
     return write_page_with_replays(folder / PAGE, folder / NUMBERS, compute)
 
 
-def _changed(results: Mapping[str, Results]) -> list[dict[str, Any]]:
+def _largest_changes(results: Mapping[str, Results]) -> list[dict[str, Any]]:
     """Return each scene with the variant that changes its weighted violation most, the largest change first."""
     whole = results[WHOLE].number("weighted_violation")
     seeds, kinds = results[WHOLE]["seed"].tolist(), scene_kinds(results[WHOLE]).kinds.tolist()

@@ -96,7 +96,7 @@ def distributions(columns: Mapping[str, Mapping[str, Array]], addition: str) -> 
     figure, panels = _panels(len(drawn), 2.3)
     for axes, (column, groups) in zip(panels, drawn.items(), strict=True):
         for i, (name, values) in enumerate(groups.items()):
-            x, shares = _thinned(*cumulative_fractions(values))
+            x, shares = _thin(*cumulative_fractions(values))
             color, dash = CYCLE[i % len(CYCLE)], _DASHES[i % len(_DASHES)]
             axes.step(x, shares, where="post", color=color, linestyle=dash, label=name)
             median = quantiles(values)["0.5"]
@@ -224,7 +224,7 @@ def legend_above(figure: Figure, axes: Axes) -> None:
     figure.legend(handles, labels, loc="outside upper center", ncols=max(1, min(columns, len(labels))))
 
 
-def _thinned(x: Array, shares: Array) -> tuple[Array, Array]:
+def _thin(x: Array, shares: Array) -> tuple[Array, Array]:
     if len(x) <= _STEPS:
         return x, shares
     rows = np.unique(np.linspace(0, len(x) - 1, _STEPS).astype(int))

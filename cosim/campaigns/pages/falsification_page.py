@@ -30,7 +30,7 @@ def write_falsification_page(folder: Path, replays: int) -> Path:
         values = {
             "unit": "scene" if summary["kind"] == "scenes" else "row", "random": random,
             "label": _LABELS[summary["search"]["objective"]], "worst": list(zip_longest(summary["worst"], random)),
-            "estimate": _estimated(summary["estimate"]) if summary["estimate"] else "",
+            "estimate": _format_estimate(summary["estimate"]) if summary["estimate"] else "",
             "value": lambda row, unit=False: _value(summary, row, unit),
         }  # fmt: skip
         keys = [row["row"] for row in summary["worst"]][:replays]
@@ -43,7 +43,7 @@ def falsification_lines(summary: dict[str, Any]) -> Iterator[str]:
     """Yield the lines about a search for a terminal."""
     s = summary
     if s["estimate"]:
-        yield f"{s['title']}: {_estimated(s['estimate'])}, from {s['flown']} flights"
+        yield f"{s['title']}: {_format_estimate(s['estimate'])}, from {s['flown']} flights"
     else:
         for name, numbers in (("search", s), ("random", s["random"])):
             worst = f", worst {_value(s, numbers['worst'][0], True)}" if numbers["worst"] else ""
@@ -78,7 +78,7 @@ def _drawings(s: dict[str, Any]) -> Iterator[NamedFigure]:
     yield NamedFigure("convergence", "The worst of the search and of random flights, after so many flights.", figure)
 
 
-def _estimated(estimate: Mapping[str, Any]) -> str:
+def _format_estimate(estimate: Mapping[str, Any]) -> str:
     if not estimate["probability"]:
         return f"below {estimate['high']:.2g} (97.5 %), none was found"
     return f"{estimate['probability']:.2g} ({estimate['low']:.2g} to {estimate['high']:.2g} at 95 %)"

@@ -85,7 +85,7 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
             traces, remarks = [], []
             for folder in folders:
                 name = f"{folder.name}: " if len(folders) > 1 else ""
-                trace, remark = _flown(repeat_of(folder, key), scratch / "run")
+                trace, remark = _fly_again(repeat_of(folder, key), scratch / "run")
                 traces += [trace | ({"name": folder.name} if name else {})] if trace else []
                 remarks += [name + remark] if remark else []
             if traces:
@@ -100,7 +100,7 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
     return Replay(f"{WORST}/{key}/{REPLAY}" if (target / REPLAY).exists() else None, tuple(stored))
 
 
-def _flown(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:
+def _fly_again(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:
     """Fly a row step by step; return its trace, None if it cannot be shown, and a remark."""
     if repeat.scenario is None:
         return None, f"was not flown: {repeat.stored['refused']}"
@@ -120,10 +120,10 @@ def _flown(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     differences = ", ".join(
-        f"{name} {_formatted(now)} instead of {_formatted(before)}" for name, (before, now) in apart.items()
+        f"{name} {_format_value(now)} instead of {_format_value(before)}" for name, (before, now) in apart.items()
     )
     return trace, f"the flight step by step differs: {differences}" if differences else remark
 
 
-def _formatted(value: Any) -> str:
+def _format_value(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else {None: "none", True: "yes", False: "no"}[value]

@@ -116,18 +116,18 @@ def _effects(s: dict[str, Any], ranked: list[str]) -> Iterator[list[str]]:
         cells = [_effect(one, s["rank_correlations"][key][name]) for key, one in zip(ranked, effects, strict=True)]
         if any(cells):
             floors = [one["floor"] for one in effects if one]
-            yield [LABELS[name], *cells, _percent(max(floors)) if floors else "–"]
+            yield [LABELS[name], *cells, _format_percent(max(floors)) if floors else "–"]
 
 
 def _effect(effect: dict[str, float] | None, correlation: dict[str, float] | None) -> str:
     """Format effect and rank correlation of a key and an outcome; an empty text if they are not significant."""
     measures = []
     if effect is not None and effect["share"] >= max(effect["floor"], _MIN_SHARE):
-        measures.append(_percent(effect["share"]))
+        measures.append(_format_percent(effect["share"]))
     if correlation is not None and abs(correlation["rho"]) >= _MIN_RHO and correlation["p"] < CHANCE:
         measures.append(f"ρ\N{NO-BREAK SPACE}{correlation['rho']:+.2f}".replace("-", "−"))
     return ", ".join(measures)
 
 
-def _percent(share: float) -> str:
+def _format_percent(share: float) -> str:
     return f"{100.0 * share:.0f} %"

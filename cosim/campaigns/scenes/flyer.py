@@ -10,7 +10,7 @@ import numpy as np
 from cosim.batch.fused import fly_scenario
 from cosim.campaigns.scenes.as_scenario import VEHICLE, scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.law_gains import law_named
+from cosim.campaigns.scenes.law_gains import law_class
 from cosim.campaigns.scenes.scenario_scene import AnyScene
 from cosim.results.record import Rows
 from cosim.scenario.scenario import Scenario
@@ -85,7 +85,7 @@ class SceneFlyer:
     """
 
     def __init__(self, law: str, conditions: Conditions | None = None, gains: Any = None) -> None:
-        of = law_named(law)
+        of = law_class(law)
         self.law = law
         self.conditions = conditions or Conditions()
         self.gains = of.gains_type() if gains is None else gains

@@ -10,7 +10,7 @@ from cosim.errors import RunError
 from plant_fmu.toml_tables import hint
 
 
-def law_named(name: str) -> Any:
+def law_class(name: str) -> Any:
     """Return the class of a law."""
     if name not in LAWS:
         raise RunError(f"law {name!r} is unknown; {hint(name, LAWS)}")
@@ -19,7 +19,7 @@ def law_named(name: str) -> Any:
 
 def gains_from(law: str, settings: Sequence[str] = ()) -> Any:
     """Return the gains of a law with settings applied."""
-    gains = law_named(law).gains_type()
+    gains = law_class(law).gains_type()
     for text in settings:
         key, equals, value = (part.strip() for part in text.partition("="))
         if not equals:

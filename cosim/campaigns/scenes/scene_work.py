@@ -88,7 +88,7 @@ class SceneWork(Work):
         rows = np.minimum(np.searchsorted(self._seeds, keys), len(self._seeds) - 1)
         return np.where(self._seeds[rows] == keys, rows, -1)
 
-    def refused(self, row: int, reason: str) -> Any:
+    def refused_table(self, row: int, reason: str) -> Any:
         """Return the table of one scene that could not be flown."""
         (line,) = self.batch(np.array([row]))
         return table_of([refused_row(int(self._seeds[row]), reason, line.decode().strip())])

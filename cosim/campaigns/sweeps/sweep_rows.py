@@ -120,7 +120,7 @@ class SweepWork(Work):
         """Return values and seeds of some rows."""
         return SweepBatch(rows, self.design.values(rows), self.design.seeds(rows))
 
-    def refused(self, row: int, reason: str) -> Any:
+    def refused_table(self, row: int, reason: str) -> Any:
         """Return the table of one row that could not be flown."""
         return table_of(self.variation.keys, self.batch(np.array([row])), BatchResult(empty_outcomes(1), {0: reason}))
 

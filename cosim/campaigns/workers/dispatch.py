@@ -69,7 +69,7 @@ class Batches:
         """Put a batch back, to be taken next."""
         self._returned.append(batch)
 
-    def measured(self, rows: int, seconds: float) -> None:
+    def adapt_size(self, rows: int, seconds: float) -> None:
         """Adapt the size by the time of a batch [s]; ignore a relatively small one: it may include start-up."""
         if rows * GROWTH < self._size:
             return
@@ -109,7 +109,7 @@ def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, No
                 batch, received = under_way.pop(flight), pool.result(flight)
                 if not isinstance(received, WorkerCrash):
                     n_finished, crashes = n_finished + 1, 0
-                    batches.measured(len(batch.rows), received[1])
+                    batches.adapt_size(len(batch.rows), received[1])
                     yield received[0]
                     yield from refused
                     refused.clear()
@@ -138,5 +138,5 @@ def _retry(work: Work, batches: Batches, batch: Batch, crash: WorkerCrash) -> li
         for half in reversed(batch.halves(FATAL - 1)):
             batches.put_back(half)
     else:
-        return [work.refused(int(batch.rows[0]), KILLED)]
+        return [work.refused_table(int(batch.rows[0]), KILLED)]
     return []

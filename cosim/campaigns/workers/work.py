@@ -49,6 +49,6 @@ class Work:
         """Return the rows of some keys; -1 for a key that no row has."""
         return np.where((keys >= 0) & (keys < len(self)), keys, -1)
 
-    def refused(self, row: int, reason: str) -> Any:
+    def refused_table(self, row: int, reason: str) -> Any:
         """Return the table of one row that could not be flown."""
         raise NotImplementedError

@@ -96,11 +96,11 @@ class Snapshot:
 def snapshots(what: str, rate: float | None = 1.0, once: bool = False) -> Iterator[Snapshot]:
     """Iterate over instants of a run until it is over."""
     if what.isdecimal() or "://" in what:
-        running = _live(_endpoint(what))
+        running = _follow_live(_parse_endpoint(what))
     elif _is_being_recorded(path := Path(what)):
-        running = _recording(path)
+        running = _follow_recording(path)
     else:
-        return _finished(path, rate, once)
+        return _play_back(path, rate, once)
     if not once:
         return running
     settled = (snapshot for snapshot in running if snapshot.row is not None or snapshot.ended or snapshot.silent)
@@ -110,7 +110,7 @@ def snapshots(what: str, rate: float | None = 1.0, once: bool = False) -> Iterat
 # ---- folders -------------------------------------------------------------------------------------------------------
 
 
-def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Snapshot]:
+def _play_back(path: Path, rate: float | None, once: bool) -> Iterator[Snapshot]:
     run = load_run(path)
     view_columns = ViewColumns(run.scenario, run.record.columns)
     record, steps = run.record, len(run.record)
@@ -145,7 +145,7 @@ def _is_being_recorded(path: Path) -> bool:
     return False
 
 
-def _recording(path: Path) -> Iterator[Snapshot]:
+def _follow_recording(path: Path) -> Iterator[Snapshot]:
     scenario = load_scenario(path / SCENARIO)
     header: dict[str, Any] = header_of(scenario, ())
     row: Array | None = None
@@ -167,13 +167,13 @@ def _recording(path: Path) -> Iterator[Snapshot]:
         fresh = silent < _FRESH
         yield Snapshot(header, row, "being recorded" if fresh else wait, silent=not fresh)
         time.sleep(_FRAME)
-    yield from _finished(path, None, once=True)
+    yield from _play_back(path, None, once=True)
 
 
 # ---- live ----------------------------------------------------------------------------------------------------------
 
 
-def _endpoint(what: str) -> tuple[str, int]:
+def _parse_endpoint(what: str) -> tuple[str, int]:
     text = f"ws://127.0.0.1:{what}" if what.isdecimal() else what
     try:
         parts = urlsplit(text)
@@ -185,7 +185,7 @@ def _endpoint(what: str) -> tuple[str, int]:
     return host, port
 
 
-def _live(endpoint: tuple[str, int]) -> Iterator[Snapshot]:
+def _follow_live(endpoint: tuple[str, int]) -> Iterator[Snapshot]:
     from websockets.exceptions import WebSocketException
     from websockets.sync.client import connect
 

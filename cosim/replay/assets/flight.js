@@ -12,7 +12,7 @@ class Flight {
   async start() {
     if (typeof WebAssembly === "undefined") throw new Error("no WebAssembly");
     const module = await inflated(this.data.wasm);
-    const code = new Blob([document.getElementById("flier").textContent], { type: "text/javascript" });
+    const code = new Blob([document.getElementById("flight-worker").textContent], { type: "text/javascript" });
     this._worker = new Worker(URL.createObjectURL(code));
     const { refused } = await this._ask({ module }, [module]);
     if (refused) throw new Error(refused);

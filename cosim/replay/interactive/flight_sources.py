@@ -129,10 +129,10 @@ def _scene(flight: Flight, token: str) -> Iterator[str]:
         values = [number(float(value)) if kind == "real" else str(int(value)) for _, value in given]
         yield f"#define N_{names} {len(given)}"
         references = [str(at) for at, _ in given] or ["0"]
-        yield f"static const fmi3ValueReference {prefix}_REFERENCES[] = {_braced(references)};"
-        yield f"static const {c} {prefix}_VALUES[] = {_braced(values or ['0'])};"
+        yield f"static const fmi3ValueReference {prefix}_REFERENCES[] = {_c_list(references)};"
+        yield f"static const {c} {prefix}_VALUES[] = {_c_list(values or ['0'])};"
     yield from normal_numbers((scenario.sensing.seed, STREAM), 6 * len(flight.noise))
 
 
-def _braced(values: Sequence[str]) -> str:
+def _c_list(values: Sequence[str]) -> str:
     return f"{{{', '.join(values)}}}"

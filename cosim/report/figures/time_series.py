@@ -96,7 +96,7 @@ def weights(data: FigureData) -> list[Panel]:
 def clearance(data: FigureData) -> list[Panel]:
     """Show the clearance to each region and to the goal: distances, and angles of attitude regions below."""
     regions = list(regions_of(data.scenario))
-    named = _named(data, [region.name for region, _ in regions])
+    named = _legend_names(data, [region.name for region, _ in regions])
     panels = []
     for unit, height in (("m", 2.5), ("°", 1.5)):
         lines, faint_lines = [], []
@@ -121,7 +121,7 @@ def clearance(data: FigureData) -> list[Panel]:
     return panels
 
 
-def _named(data: FigureData, names: list[str]) -> list[str]:
+def _legend_names(data: FigureData, names: list[str]) -> list[str]:
     """Return the names for the legend: all, or of many regions the goal and the nearest ones."""
     if len(names) <= _NAMED:
         return names

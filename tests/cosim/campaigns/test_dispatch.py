@@ -18,7 +18,7 @@ class Work:
     def batch(self, rows):
         return rows.tolist()
 
-    def refused(self, row, reason):
+    def refused_table(self, row, reason):
         assert "crashed" in reason
         return [-row]
 
@@ -93,17 +93,17 @@ def test_batch_size_adapts_to_row_duration(row_time, size):
     batches, sizes = batches_of(100_000), []
     for _ in range(12):
         sizes.append(len(batches.take(4).rows))
-        batches.measured(sizes[-1], row_time * sizes[-1])
+        batches.adapt_size(sizes[-1], row_time * sizes[-1])
     assert sizes[0] == 1 and sizes[-1] == size  # a second
     assert all(after <= 4 * before for before, after in zip(sizes, sizes[1:], strict=False))
-    batches.measured(1, 500.0 * row_time)  # of a new worker, which had to load what it flies with
+    batches.adapt_size(1, 500.0 * row_time)  # of a new worker, which had to load what it flies with
     assert len(batches.take(4).rows) == size
 
 
 def test_final_batches_are_balanced_with_a_minimum_size():
     batches = batches_of(1000)
-    batches.measured(1000, 1.0)  # 1 ms each
-    batches.measured(1000, 1.0)
+    batches.adapt_size(1000, 1.0)  # 1 ms each
+    batches.adapt_size(1000, 1.0)
     sizes = []
     while (batch := batches.take(4)) is not None:
         sizes.append(len(batch.rows))

@@ -9,7 +9,7 @@ from scipy.stats import f as f_test
 from scipy.stats import f_oneway
 
 from cosim.campaigns.analysis.campaign_summary import worst_table
-from cosim.campaigns.analysis.statistics import bins, effect, median_difference, paired, rate
+from cosim.campaigns.analysis.statistics import bins, count_pairs, effect, median_difference, rate
 from cosim.campaigns.scenes.flyer import Score
 from cosim.campaigns.scenes.scene_rows import row_of
 from tests.cosim.campaigns.scene_data import results_of
@@ -119,11 +119,11 @@ def test_constant_or_few_samples_have_no_effect():
 
 def test_exact_test_matches_the_binomial_distribution():
     one, other = np.array([1, 1, 1, 1, 0, 1, 0], bool), np.array([0, 0, 0, 0, 1, 1, 0], bool)
-    found = paired(one, other)
+    found = count_pairs(one, other)
     assert (found["both"], found["only_one"], found["only_other"], found["neither"]) == (1, 4, 1, 1)
     as_uneven = sum(abs(sum(coins) - 2.5) >= 1.5 for coins in itertools.product((0, 1), repeat=5))
     assert found["p"] == pytest.approx(as_uneven / 32)
-    assert paired(one, one)["p"] is None
+    assert count_pairs(one, one)["p"] is None
 
 
 @pytest.mark.medium

@@ -88,7 +88,7 @@ def test_commanded_change_is_drawn_from_its_time(run, tmp_path, monkeypatch):
         {"time": 0.5, "region": 0, "shape": {"kind": "sphere", "center": (7.0, 0.0, 4.0), "radius": 0.9}},
         {"time": 0.8, "region": 0, "shape": {"kind": "box", "center": (7.0, 0.0, 4.0), "size": (1.0, 1.0, 1.0)}},
     ]
-    monkeypatch.setattr("cosim.export.viewer_scene.changes_of", lambda *_: changes)
+    monkeypatch.setattr("cosim.export.viewer_scene.list_region_changes", lambda *_: changes)
     (path,) = export_run(run, "rrd", tmp_path / "out.rrd")
     read = Read(path)
     sizes = [(time, value[0][0]) for time, value in read["/world/regions/goal/Ellipsoids3D", "half_sizes"]]

@@ -6,11 +6,11 @@ const [assets, file, out] = process.argv.slice(2)
 const job = JSON.parse(fs.readFileSync(file))
 const text = (name) => fs.readFileSync(`${assets}/${name}`, "utf8")
 
-globalThis.document = { getElementById: () => ({ textContent: text("flier.js") }) }
+globalThis.document = { getElementById: () => ({ textContent: text("flight_worker.js") }) }
 globalThis.Worker = class {
   constructor() {
     this.self = { postMessage: (data) => this.onmessage({ data }) }
-    new Function("self", text("flier.js"))(this.self)
+    new Function("self", text("flight_worker.js"))(this.self)
   }
   postMessage(data) {
     this.self.onmessage({ data })
