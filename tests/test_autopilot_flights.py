@@ -14,9 +14,7 @@ from benchmarks.autopilot import flights
 from benchmarks.autopilot.flight_evaluation import clearances_at
 from benchmarks.autopilot.flights import Task
 from benchmarks.autopilot.scenes import random_scene
-from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
-from tests.cosim.companion.stand_in import StandIn
 
 
 def test_random_scenes_leave_start_dive_and_goal_free_and_are_repeatable():
@@ -75,18 +73,6 @@ def test_a_kill_ends_the_autopilot(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         flights.make_flights([Task("docking")], program, 0, None)
     assert [process.poll() for process in processes] == [-signal.SIGKILL]
-
-
-@pytest.mark.medium
-def test_the_origin_is_sent_each_second_until_the_autopilot_has_a_position(monkeypatch):
-    link = StandIn(profile="ardusub", silent={"GLOBAL_POSITION_INT"})
-    link.events = [(2.5, link.silent.clear)]
-    flights.set_origin(link)
-    assert 3 <= len(link.of_type("SET_GPS_GLOBAL_ORIGIN")) <= 4
-    monkeypatch.setattr(flights, "_ORIGIN_PATIENCE", 2.0)
-    link.silent.add("GLOBAL_POSITION_INT")
-    with pytest.raises(RunError, match="not accepted the global origin for 2 s"):
-        flights.set_origin(link)
 
 
 def test_parameters_of_the_autopilot_are_numbers():

@@ -23,12 +23,10 @@ from benchmarks.autopilot.flight_evaluation import FlightEvents, evaluate_flight
 from benchmarks.autopilot.scenes import random_scene
 from benchmarks.autopilot.simulated_link import FAULTS, SimulatedLink
 from cosim.command_line.process import kills_interrupt
-from cosim.companion.autopilot_link import AutopilotLink
 from cosim.companion.companion_options import CompanionOptions
 from cosim.companion.companion_run import Companion
 from cosim.companion.frame_alignment import SceneOrigin
 from cosim.errors import CosimError, RunError
-from cosim.mavlink.wire.dialect import dialect, make_rate_requests
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GROUND_STATION, GroundLink
 from cosim.mavlink.wire.options import ORIGIN
@@ -48,7 +46,6 @@ RANDOM_DURATION = 45.0  # s, duration of a flight in a random scene
 _LOWERED = 12.0  # s, time of the plant at which the vehicle is at its start
 _LONGEST = 400.0  # s, duration of the plant's scenario
 _PATIENCE = 120.0  # s of the wall clock without a frame, after which a flight ends
-_ORIGIN_PATIENCE = 60.0  # s, during which the global origin is sent each second until the autopilot accepts it
 # parameters of ArduSub for a DVL in place of GPS
 _WITHOUT_GPS = {"VISO_TYPE": 1, "EK3_SRC1_VELXY": 6, "EK3_SRC1_POSXY": 0, "EK3_SRC1_VELZ": 0, "GPS1_TYPE": 0}
 _WATER = 1023.6  # kg/m3, density of the water in ArduPilot's simulator
@@ -142,6 +139,7 @@ def _steer(task: Task, scenario: Scenario, link: SimulatedLink, events: FlightEv
     options = CompanionOptions(
         steer_by=task.steer_by, sticks_by=task.sticks_by, origin=SceneOrigin(geodetic=ORIGIN, density=_WATER),  # type: ignore[arg-type]
         arm=True, pilot_gain=1.0, level_dive=task.level_dive, timeout=90.0,
+        global_origin=ORIGIN if task.is_random else None,
     )  # fmt: skip
     companion = Companion(scenario, link, options)
 
@@ -156,8 +154,6 @@ def _steer(task: Task, scenario: Scenario, link: SimulatedLink, events: FlightEv
             link.events.append((events.failed_at, lambda: FAULTS[task.fault](link)))
 
     try:
-        if task.is_random:
-            set_origin(link)
         events.status = companion.run(folder / "companion", report=False, on_state=note).summary["status"]
     except CosimError as error:
         events.status = f"failed: {error}"
@@ -166,21 +162,6 @@ def _steer(task: Task, scenario: Scenario, link: SimulatedLink, events: FlightEv
         raise
     events.begun = link.waited()
     return "completed"
-
-
-def set_origin(link: AutopilotLink) -> None:
-    """Send the global origin of an autopilot without GPS until it is accepted; RunError if it never is."""
-    m, until, sent = dialect(), link.clock() + _ORIGIN_PATIENCE, -math.inf
-    origin = m.MAVLink_set_gps_global_origin_message(1, *(round(1e7 * angle) for angle in ORIGIN), 0)
-    while (now := link.clock()) < until:
-        if now - sent >= 1.0:
-            sent = now
-            for message in (origin, *make_rate_requests(m, 1, {"GLOBAL_POSITION_INT": 5.0})):
-                link.send(message)
-        for one in link.receive(0.1):
-            if one.name == "GLOBAL_POSITION_INT" and (one.message.lat or one.message.lon):
-                return
-    raise RunError(f"the autopilot has not accepted the global origin for {_ORIGIN_PATIENCE:g} s")
 
 
 def make_flights(

@@ -49,6 +49,7 @@ def add_verbs(verbs: Any) -> None:
     where = verb.add_mutually_exclusive_group()
     flag(where, "--scene-origin LAT,LON", "coordinates of the scene's origin: seven decimals are 1 cm", _scene_origin)
     flag(where, "--surveyed-origin N,E,D", "position of the autopilot's local origin in the scene [m]", _position)
+    flag(verb, "--global-origin LAT,LON", "where the vehicle started, as global origin of an autopilot without", origin)
     flag(verb, "--surface-pressure HPA", "pressure of the air at the surface", float_range(500.0, 1200.0), 1013.25)
     flag(verb, "--water-density KG/M3", "sea: 1025", float_range(900.0, 1200.0), 1000.0)
     arming = verb.add_mutually_exclusive_group()

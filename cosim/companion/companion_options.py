@@ -41,6 +41,8 @@ class CompanionOptions:
     level_dive: float = 0.6  # m, depth of an ArduSub's dive after arming, before it is steered; 0 for none
     least_battery: float = 0.0  # percent, remaining charge below which the vehicle is held
     timeout: float | None = None  # s, longest wait until steering begins; None: no limit
+    # deg, global origin to set if the autopilot has none: where the vehicle was when it started
+    global_origin: tuple[float, float] | None = None
     vehicle_system: int | None = None  # system id of the autopilot; None: the first one that is heard
 
     @property

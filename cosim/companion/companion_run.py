@@ -144,7 +144,7 @@ class Companion:
         self.session = AutopilotSession(link, self.scenario.vehicle, options)
         self._reported = ("", "")
         self.placement = ""
-        self._placed_by: tuple[Array | None, bool] = (None, False)
+        self._placed_by: tuple[Array | None, bool, bool] = (None, False, False)
         self._scene = Placement(self.scenario)
         self.session.dive.clearance = self._clearance
 
@@ -276,13 +276,16 @@ class Companion:
             return
         position = session.alignment.to_scene(session.reported.position)
         if not np.isfinite(position).all():
-            session.is_placed, self._placed_by = False, (None, False)
+            session.is_placed, self._placed_by = False, (None, False, False)
             return
         distance = self._scene.distance(position)
         is_near = distance <= MAX_DISTANCE
-        if self._placed_by[0] is not offset or self._placed_by[1] != is_near:
-            self.placement = self._scene.describe(position, session.reported.quaternion)
+        quaternion = session.reported.quaternion
+        contradictions = self._scene.contradictions(position, quaternion, session.reported.ranges)
+        placed_by = offset, is_near, bool(contradictions)
+        if self._placed_by[0] is not offset or self._placed_by[1:] != placed_by[1:]:
+            self.placement = "; WARNING: ".join([self._scene.describe(position, quaternion), *contradictions])
             session.misplaced = "" if is_near else f"{format_distance(distance)} from everything in it"
             self.placement += f"; {session.misplaced}" if session.misplaced else ""
-        self._placed_by = offset, is_near
+        self._placed_by = placed_by
         session.is_placed = is_near or self._options.dry_run

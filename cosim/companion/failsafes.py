@@ -49,6 +49,7 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
         Parameter("MAV_GCS_SYSID", "system whose sticks are accepted, from 4.7 on"),
         Parameter("MAV_GCS_SYSID_HI", "last system of a range of such systems, 0 for none"),
         Parameter("JS_GAIN_DEFAULT", "pilot gain"),
+        Parameter("RC3_TRIM", "us, of the vertical stick's pulse"),
         Parameter("JS_THR_GAIN", "gain of the vertical stick beside it"),
         Parameter("EK3_MAG_CAL", "when it learns the magnetic field, 2: never"),
         Parameter("ACRO_YAW_P", "yaw rate of a full stick, in 45 deg/s"),
@@ -75,7 +76,10 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
 # parameters of the reaction to a lost companion; at least one of them must be nonzero
 _REACTIONS = {"ardusub": ("FS_PILOT_INPUT", "FS_GCS_ENABLE"), "px4": ("COM_OF_LOSS_T",)}
 # absent in some versions: no warning without them
-_OPTIONAL = ("SYSID_MYGCS", "MAV_GCS_SYSID", "MAV_GCS_SYSID_HI", "FS_GCS_TIMEOUT", "ATC_ANGLE_MAX", "ANGLE_MAX")
+_OPTIONAL = (
+    "SYSID_MYGCS", "MAV_GCS_SYSID", "MAV_GCS_SYSID_HI", "FS_GCS_TIMEOUT", "ATC_ANGLE_MAX", "ANGLE_MAX", "RC3_TRIM",
+)  # fmt: skip
+_TRIM_TOLERANCE = 30.0  # us, of RC3_TRIM
 _HOLD_TIMES = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # times [s] the last sticks act: with a radio, and without one
 _MAX_HOLD_TIME = 1.0  # s
 _NEVER_LEARN = 2.0  # value of EK3_MAG_CAL: never learn the magnetic field
@@ -167,6 +171,20 @@ class Failsafes:
             return ""
         name = "MAV_GCS_SYSID" if "MAV_GCS_SYSID" in self.values else "SYSID_MYGCS"
         return f"{name} is {accepted[0]}" + (f", {name}_HI {accepted[-1]}" if accepted[-1] > accepted[0] else "")
+
+    def misread_throttle(self) -> str:
+        """Return the value of RC3_TRIM by which a resting vertical stick would push; empty if none is known."""
+        # A resting stick is 1500 us: the middle between RC3_TRIM and 1900 us, from 4.7 on RC3_TRIM itself.
+        trim = self.values.get("RC3_TRIM")
+        if trim is None or not self.accepted_systems():
+            return ""
+        expected = 1500.0 if "MAV_GCS_SYSID" in self.values else 1100.0
+        if abs(trim - expected) <= _TRIM_TOLERANCE:
+            return ""
+        push = "down" if trim > expected else "up"
+        return (
+            f"RC3_TRIM is {trim:g}: a resting vertical stick would push {push}; expected {expected:g} in this version"
+        )
 
     def learns_magnetic_field(self) -> bool:
         """Return True if an ArduSub learns the magnetic field in flight; without a fix its heading then drifts."""

@@ -101,7 +101,9 @@ class FrameAlignment:
         if not np.isfinite(state.position).all():
             return "LOCAL_POSITION_NED"
         if state.global_position is None:
-            return "GLOBAL_POSITION_INT: the autopilot has no global position; set its origin, or survey it"
+            return (
+                "GLOBAL_POSITION_INT: the autopilot has no global position; give --global-origin, or survey its origin"
+            )
         if math.isnan(state.pressure):
             return "SCALED_PRESSURE or SCALED_PRESSURE2"
         return f"{_SAMPLES} global positions that agree within {_SPREAD:g} m with the local ones"

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
+from controller.quaternion import rotation_matrix
 from controller.regions.region_set import of_attitude
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.signals import Array
 
+_BEAMS = {  # words for, and body directions of, a distance sensor by its MAV_SENSOR_ROTATION
+    0: ("ahead", (1.0, 0.0, 0.0)), 2: ("right", (0.0, 1.0, 0.0)), 4: ("behind", (-1.0, 0.0, 0.0)),
+    6: ("left", (0.0, -1.0, 0.0)), 24: ("above", (0.0, 0.0, -1.0)), 25: ("below", (0.0, 0.0, 1.0)),
+}  # fmt: skip
+_RANGE_TOLERANCE = 0.5  # m, by which a sensor's range may differ from the scene's
+_MAX_RANGE, _ROUNDING = 50.0, 1e-3  # m
 MAX_DISTANCE = 50.0  # m, horizontal distance from everything in the scene, beyond which nothing is steered
 
 
@@ -38,6 +46,23 @@ class Placement:
     def clearance(self, position: Array, quaternion: Array) -> float:
         """Return the minimum clearance of hard regions [m] at a pose; infinite if there are none."""
         return float(np.min(self._environment.evaluate(position, quaternion)[1][self.hard], initial=math.inf))
+
+    def contradictions(self, position: Array, quaternion: Array, ranges: Mapping[int, float]) -> list[str]:
+        """List ranges [m], by MAV_SENSOR_ROTATION, that differ from those to the hard regions of the scene."""
+        R, differing = rotation_matrix(quaternion), []
+        for rotation in ranges.keys() & _BEAMS:
+            (word, beam), measured = _BEAMS[rotation], ranges[rotation]
+            expected = self._range(position, quaternion, R @ beam)
+            if abs(expected - measured) > _RANGE_TOLERANCE and expected < _MAX_RANGE:
+                differing.append(f"{word} {expected:.2f} m are free, but {measured:.2f} m by the distance sensor")
+        return differing
+
+    def _range(self, position: Array, quaternion: Array, direction: Array) -> float:
+        """Return the distance [m] to the first hard region in a direction, a unit vector; at least 50 m for none."""
+        way = 0.0
+        while way < _MAX_RANGE and (free := self.clearance(position + way * direction, quaternion)) > _ROUNDING:
+            way += free
+        return way
 
     def describe(self, position: Array, quaternion: Array) -> str:
         """Describe a pose by its position [m, NED], and its distances to the goal and the nearest hard region."""

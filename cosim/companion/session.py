@@ -27,8 +27,8 @@ from plant_fmu import Vehicle
 
 log = logging.getLogger(__name__)
 
-# s, periods of heartbeats, TIMESYNC, rate and mode requests
-_HEARTBEAT_PERIOD, _SYNC_PERIOD, _RATES_PERIOD, _MODE_PERIOD = 1.0, 0.5, 10.0, 0.25
+# s, periods of heartbeats, TIMESYNC, rate and mode requests, and global origins
+_HEARTBEAT_PERIOD, _SYNC_PERIOD, _RATES_PERIOD, _MODE_PERIOD, _ORIGIN_PERIOD = 1.0, 0.5, 10.0, 0.25, 1.0
 _PILOT_TIMEOUT = 1.0  # s, for which deflected sticks of another station count as a pilot's takeover
 _HOLD_TIMEOUT = 1.0  # s, in ``held`` without the hold mode, after which the depth-hold mode is requested instead
 _ROUNDING = 1e-6  # s
@@ -162,6 +162,8 @@ class AutopilotSession:
             return f"{text}; expected --system-id {expected}, or --steer-by velocity"
         if o.steer_by == "wrench" and (warning := self.failsafes.held_sticks_warning(accepts_unknown=not is_read)):
             return f"{warning}; with --steer-by wrench they would turn the vehicle over"
+        if is_read and (misread := self.failsafes.misread_throttle()):
+            return misread
         if self._gain_error() > GAIN_TOLERANCE:
             return f"the autopilot's pilot gain is {self._gain():g}, expected {o.pilot_gain:g} of --pilot-gain"
         return ""
@@ -231,6 +233,10 @@ class AutopilotSession:
         if self._is_due("sync", _SYNC_PERIOD, now):
             self._link.send(m.MAVLink_timesync_message(0, self.reported.sync.request(now)))
         is_up = math.isfinite(self.reported.age(now))  # one that starts does not answer parameter requests
+        origin = self._options.global_origin
+        if origin is not None and not self.reported.has_origin and self._is_due("origin", _ORIGIN_PERIOD, now):
+            latitude, longitude = (round(1e7 * angle) for angle in origin)
+            self._link.send(m.MAVLink_set_gps_global_origin_message(self.reported.system, latitude, longitude, 0))
         for name in self.failsafes.names_to_request(now) if is_up else ():
             self._link.send(m.MAVLink_param_request_read_message(self.reported.system, 1, name.encode(), -1))
         if self._is_due("rates", _RATES_PERIOD, now):

@@ -58,9 +58,11 @@ class ReportedState:
         # latitude and longitude [deg] and altitude above home [m]
         self.global_position: tuple[float, float, float] | None = None
         # absolute pressure [hPa], of the second sensor if there is one; NaN if none is reported
-        self.pressure = self.altitude = self.battery = self.pilot_gain = math.nan
+        self.pressure = self.battery = self.pilot_gain = math.nan
+        self.ranges: dict[int, float] = {}  # m, of distance sensors, by MAV_SENSOR_ROTATION
         self.pulses: tuple[int, ...] = ()
         self.is_leaking = self.is_reckoned = self._is_absolute = False
+        self.has_origin = False  # True once the autopilot has a global origin
         self.resets = 0  # ODOMETRY.reset_counter of the autopilot's estimate
         self.received_at = -math.inf  # our time [s] of the autopilot's last processed message
         self.message_counts: Counter[str] = Counter()  # counts of received messages, by name
@@ -92,6 +94,11 @@ class ReportedState:
             stamped = now - (boot + self.sync.offset)
             ages.append(max(now - received, stamped if math.isfinite(stamped) else 0.0))
         return max(ages)
+
+    @property
+    def altitude(self) -> float:
+        """Range downwards [m]; NaN if none is reported."""
+        return self.ranges.get(_DOWNWARDS, math.nan)
 
     @property
     def updates(self) -> int:
@@ -148,7 +155,10 @@ class ReportedState:
 
     def _receive_global_position_int(self, m: Any, now: float) -> None:
         if m.lat or m.lon or self._is_absolute:  # an ArduSub without a position sends zeros
-            self.global_position = m.lat * 1e-7, m.lon * 1e-7, m.relative_alt * _MILLI
+            self.global_position, self.has_origin = (m.lat * 1e-7, m.lon * 1e-7, m.relative_alt * _MILLI), True
+
+    def _receive_gps_global_origin(self, m: Any, now: float) -> None:
+        self.has_origin = True
 
     def _receive_scaled_pressure(self, m: Any, now: float) -> None:
         if not self._second:
@@ -158,8 +168,9 @@ class ReportedState:
         self._second, self.pressure = True, m.press_abs
 
     def _receive_distance_sensor(self, m: Any, now: float) -> None:
-        if m.orientation == _DOWNWARDS:
-            self.altitude = m.current_distance * 0.01
+        self.ranges.pop(m.orientation, None)
+        if m.min_distance <= m.current_distance <= m.max_distance:
+            self.ranges[m.orientation] = m.current_distance * 0.01
 
     def _receive_servo_output_raw(self, m: Any, now: float) -> None:
         if m.port == 0:

@@ -53,6 +53,8 @@ def command_words(command: cmd.Command) -> str:
             return f"Target at {_format_position(command.position)}{size}"
         case cmd.SetHeading():
             return f"Heading {math.degrees(command.heading) % 360.0:.0f}°"
+        case cmd.SetDepth():
+            return f"Depth {command.depth:.3g} m"
         case cmd.ManualControl():
             return "Sticks moved"
         case cmd.SetAttitude():

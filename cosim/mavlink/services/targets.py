@@ -14,7 +14,7 @@ from cosim.mavlink.vehicle.profile import MODE_TABLE
 from cosim.mavlink.vehicle.speed import SPEED, resolve_speed
 from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
 from cosim.scenario.region_tables import Vector3
-from cosim.simulation.commands.commands import Command, SetHeading, SetMode, SetTarget
+from cosim.simulation.commands.commands import Command, SetDepth, SetHeading, SetMode, SetTarget
 
 _X_Y, _Z = 0b011, 0b100  # type_mask: bits of ignored fields
 _VELOCITY, _ACCELERATION, _FORCE, _YAW, _YAW_RATE = 0b111000, 0b111 << 6, 1 << 9, 1 << 10, 1 << 11
@@ -84,13 +84,17 @@ class Targets(Service):
         self._set_point(sender, message, frame, self._from_local(frame, raw), raw)
 
     def _receive_set_position_target_global_int(self, sender: Sender, message: Any) -> None:
-        frame = message.coordinate_frame
+        context, frame = self.context, message.coordinate_frame
+        if context.profile.name == "ardusub" and context.mode_ahead == "depth_hold" and not message.type_mask & _Z:
+            if self.accept_control(sender) and math.isfinite(message.alt):  # its frame is ignored there
+                context.submit(SetDepth(-message.alt))
+            return
         position = None
         if frame != _LOCAL:
             latitude, longitude = unscale_position(frame, message.lat_int, message.lon_int)
-            position = to_local_position(self.context, frame, latitude, longitude, message.alt)
+            position = to_local_position(context, frame, latitude, longitude, message.alt)
         if position is None:
-            self.context.reject(f"set-point in frame {frame}; expected 0, 3, 5 or 6", "frame")
+            context.reject(f"set-point in frame {frame}; expected 0, 3, 5 or 6", "frame")
             return
         self._set_point(sender, message, frame, position, (message.lat_int, message.lon_int, message.alt))
 
@@ -117,6 +121,8 @@ class Targets(Service):
         if not self.accept_control(sender):
             return
         reason = _unsupported_reason(message)
+        if context.profile.name == "ardusub" and not mask & _ACCELERATION:
+            reason = "accelerations are not followed"
         if reason:
             context.reject(f"set-point with mask {mask}: {reason}", "mask")
             return

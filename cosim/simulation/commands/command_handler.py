@@ -96,6 +96,8 @@ class CommandHandler:
                 self._release()
             case cmd.SetHeading():
                 self.heading, self.turned = command.heading, True
+            case cmd.SetDepth():
+                self._stabilizer.target_depth = command.depth
             case cmd.ManualControl():
                 self._manual[:], self._by_gain = command.wrench, command.by_gain
             case cmd.SetAttitude():

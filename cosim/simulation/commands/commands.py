@@ -73,6 +73,12 @@ class SetHeading(_Command, frozen=True):
     heading: Finite  # rad
 
 
+class SetDepth(_Command, frozen=True):
+    """Go to another depth and keep it, in the mode `depth_hold`, until the vertical stick moves."""
+
+    depth: Finite  # m
+
+
 class ManualControl(_Command, frozen=True):
     """Control manually: a fraction, from -1 to 1, of the maximum wrench along and about each body axis."""
 
@@ -159,6 +165,7 @@ Command = (
     | SetMode
     | SetTarget
     | SetHeading
+    | SetDepth
     | ManualControl
     | SetAttitude
     | AddObstacle

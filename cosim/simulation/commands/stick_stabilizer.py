@@ -38,6 +38,7 @@ class StickStabilizer:
         """Keep the present heading and depth from now on, and no other attitude."""
         self.attitude: Array | None = None  # quaternion that is kept in place of the sticks' attitude
         self._heading, self._depth = self._yaw(), float(self._state.position[2])
+        self.target_depth: float | None = None  # m, to which the kept depth moves at the rate of a full stick
         self._integral = 0.0  # N, integral part of the force down
 
     def wrench(self, sticks: Array, gain: float, keep_depth: bool, rate_down: float | None = None) -> Array:
@@ -78,6 +79,10 @@ class StickStabilizer:
     def _heave(self, rate: float, R: Array) -> float:
         """Return the force down [N], world axes, for a rate of the depth [m/s]."""
         depth = float(self._state.position[2])
+        if rate:
+            self.target_depth = None
+        elif self.target_depth is not None:
+            rate = min(max((self.target_depth - self._depth) / self._period, -CLIMB_RATE), CLIMB_RATE)
         if rate:
             ahead = self._depth + rate * self._period - depth
             self._depth = depth + min(max(ahead, -_FARTHEST[1]), _FARTHEST[1])

@@ -170,6 +170,11 @@ NOT_STEERED = {
     "an ArduSub that would ignore sticks": (
         {"profile": "ardusub"}, {"profile": "ardusub"}, parameter(b"SYSID_MYGCS", 250.0),
         r"SYSID_MYGCS is 250, and the companion's system id 255: .*; expected --system-id 250, or"),
+    **{f"an ArduSub {version} whose resting vertical stick pushes {push}": (
+        {"profile": "ardusub"}, {"profile": "ardusub"}, (parameter(name, 255.0), parameter(b"RC3_TRIM", trim)),
+        rf"RC3_TRIM is {trim:g}: a resting vertical stick would push {push}; expected {rest} in this version")
+       for version, name, trim, push, rest in (
+           ("4.5", b"SYSID_MYGCS", 1500.0, "down", 1100), ("4.7", b"MAV_GCS_SYSID", 1100.0, "up", 1500))},
     "an ArduSub whose last sticks of all axes would act on": (
         {"profile": "ardusub"}, {"profile": "ardusub", "steer_by": "wrench"}, parameter(b"RC_OVERRIDE_TIME", 3.0),
         r"RC_OVERRIDE_TIME is 3; expected 1 s or less; with --steer-by wrench they would turn the vehicle over"),
@@ -189,7 +194,8 @@ NOT_STEERED = {
 @pytest.mark.parametrize(("kind", "options", "event", "words"), NOT_STEERED.values(), ids=NOT_STEERED)
 def test_no_setpoints_are_sent_to_a_vehicle_that_cannot_be_steered(tmp_path, kind, options, event, words):
     link = StandIn(**{"profile": "generic", "shift": SHIFT} | kind)
-    link.events = [(0.5, lambda: link.hear(event, 1, 1))] if event else []
+    events = () if event is None else event if isinstance(event, tuple) else (event,)
+    link.events = [(0.5, lambda: [link.hear(message, 1, 1) for message in events])]
     if "timeout" in options:
         link.events.append((2.0, lambda: link.queue.submit(Arm(True))))
     with pytest.raises(RunError, match=words):
@@ -206,6 +212,20 @@ def test_the_last_system_of_a_range_may_be_answered_after_the_first(tmp_path):
         (1.0, lambda: answer(MAV_GCS_SYSID_HI=255.0)(link)),
     ]
     assert Flight(tmp_path, 1.0, link=link, profile="ardusub").status == "completed"
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("answers", ["GLOBAL_POSITION_INT", "GPS_GLOBAL_ORIGIN"])
+def test_a_global_origin_is_sent_each_second_until_the_autopilot_has_one(tmp_path, answers):
+    link = StandIn(profile="generic", shift=SHIFT, silent={"GLOBAL_POSITION_INT", "GPS_GLOBAL_ORIGIN"})
+    link.events = [(2.5, lambda: link.silent.discard(answers)), (5.0, link.silent.clear)]
+    flight = Flight(tmp_path, 1.0, link=link, global_origin=ORIGIN)
+    origins = [(at, m) for at, m in link.sent if m.get_type() == "SET_GPS_GLOBAL_ORIGIN"]
+    assert flight.status == "completed" and 3 <= len(origins) <= 6 and min(np.diff([at for at, _ in origins])) > 0.98
+    assert {(m.target_system, m.latitude, m.longitude) for _, m in origins} == {(1, 559097000, -33203000)}
+    without = StandIn(profile="generic", shift=SHIFT)
+    Flight(tmp_path / "without", 0.5, link=without, origin=SceneOrigin(surveyed=(0.0, 0.0, 0.0)))
+    assert not without.of_type("SET_GPS_GLOBAL_ORIGIN")
 
 
 @pytest.mark.medium

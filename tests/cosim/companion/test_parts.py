@@ -524,7 +524,7 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     failsafes = Failsafes("ardusub")
     assert not failsafes.is_read(0.0)
     asked = [len(failsafes.names_to_request(0.25 * k)) for k in range(9)]
-    assert asked == [24, 0, 24, 0, 24, 0, 24, 0, 24]
+    assert asked == [25, 0, 25, 0, 25, 0, 25, 0, 25]
     values = {"FS_GCS_ENABLE": 2.0, "FS_GCS_TIMEOUT": 5.0, "SOMETHING_ELSE": 1.0, "FS_EKF_ACTION": math.nan}
     failsafes_of("ardusub", failsafes, **values)
     assert "FS_GCS_ENABLE" not in failsafes.names_to_request(2.5)

@@ -72,6 +72,52 @@ def test_distance_is_that_of_the_nearest_box_about_a_bounded_region(position):
     assert Placement(SCENE).distance(np.array(position)) == pytest.approx(nearest, abs=1e-9)
 
 
+POOL = load_scenario(
+    "pipe-inspection",
+    ["regions=[{name='pool',criterion='obstacle',keep='in',gain=100,shape={type='box',center=[0,0,2],size=[10,6,4]}}]"],
+)
+BEAMS = {
+    0: (0, 1),
+    2: (1, 1),
+    4: (0, -1),
+    6: (1, -1),
+    24: (2, -1),
+    25: (2, 1),
+}  # axes and signs, by MAV_SENSOR_ROTATION
+
+
+@given(
+    st.tuples(*[st.floats(-1.0, 1.0)] * 3), st.sampled_from(sorted(BEAMS)), st.sampled_from(range(4)),
+    st.floats(-2.0, 2.0).filter(lambda error: abs(abs(error) - 0.5) > 0.01),
+)  # fmt: skip
+def test_a_distance_sensor_contradicts_a_scene_that_is_off(fraction, rotation, quarter, error):
+    """Beside the walls, floor and surface of a basin, at four headings."""
+    position = np.array([0.0, 0.0, 2.0]) + 0.98 * np.array(fraction) * [5.0, 3.0, 2.0]
+    angle = quarter * np.pi / 4
+    quaternion = np.array([np.cos(angle), 0.0, 0.0, np.sin(angle)])
+    axis, sign = BEAMS[rotation]
+    if axis < 2:
+        ahead = np.rint([np.cos(2 * angle), np.sin(2 * angle)])
+        direction = sign * np.array([*(ahead if axis == 0 else [-ahead[1], ahead[0]]), 0.0])
+    else:
+        direction = np.array([0.0, 0.0, sign])
+    free = float(direction @ np.array([0.0, 0.0, 2.0]) + np.abs(direction) @ [5.0, 3.0, 2.0] - direction @ position)
+    (found,) = Placement(POOL).contradictions(position, quaternion, {rotation: free + error, 12: 1.0}) or ("",)
+    assert bool(found) == (abs(error) > 0.5)
+    assert (
+        not found or f"{free:.1f}" in found or float(re.findall(r"[\d.]+", found)[0]) == pytest.approx(free, abs=0.01)
+    )
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize(("depth", "is_warned"), [(0.0, False), (2.0, True)])
+def test_a_bottom_elsewhere_than_in_the_scene_is_shown_before_arming(tmp_path, depth, is_warned):
+    link = StandIn(profile="generic", armed=False, overrides=["plant.parameters.bottom_depth=4.9"])
+    _, notes = fly(link, tmp_path / "run", SceneOrigin(surveyed=(0.0, 0.0, depth)))
+    placement = next(text for *_, text, armed in notes if text and armed)
+    assert ("; WARNING: below " in placement) == is_warned
+
+
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     "origin",

@@ -14,6 +14,7 @@ from cosim.simulation.commands.commands import (
     ChangeSetting,
     ManualControl,
     RemoveObstacle,
+    SetDepth,
     SetHeading,
     SetMode,
     SetTarget,
@@ -56,8 +57,8 @@ FAR = (30.0, -20.0, 4.0)
 X, Y, Z = where(FAR)
 
 
-def globe(frame):
-    return mavlink.MAVLink_set_position_target_global_int_message(0, 1, 1, frame, POSITION, X, Y, Z, *[0] * 8)
+def globe(frame, mask=POSITION):
+    return mavlink.MAVLink_set_position_target_global_int_message(0, 1, 1, frame, mask, X, Y, Z, *[0] * 8)
 
 
 def obstacle(number=1, frame=1, place=(4.0, 5.0, 6.0)):
@@ -102,6 +103,10 @@ SCRIPTS = {
         *[velocity((0.2, 0.0, -0.1)), 0.06] * 20, velocity((0.0, 0.3, 0.0)),
         [SetTarget(*HERE, (0.2, 0.0, -0.1)), SetTarget(*HERE, (0.0, 0.3, 0.0))], 2.9, [], 0.2, [SetTarget(*HERE)],
         "No velocity for 3 s: the vehicle stays"],
+    "a depth as ArduSub's ALT_HOLD takes it: an altitude alone, in any frame, at each message": [
+        {"commands.mode": 6.0}, local(), globe(0, 0xFFFB), globe(1, 0xFFFB), globe(6), globe(0, 0xFFFF),
+        [SetDepth(4.0)] * 3],
+    "no mask, which ArduSub drops": [local(mask=0), globe(0, 0), []],
     "another mode": [HOLD, local(), sticks(x=1000), PULSES, []],
     "sticks in reach": [sticks(x=1000), PULSES, []],
     # PX4's pattern: stream set-points, then switch to offboard; ArduPilot's: at once, before a snapshot shows it

@@ -140,6 +140,7 @@ def test_end_event_states_the_status(paper, status, text):
         (cmd.SetTarget((7.0, 0.0, 4.5)), "Target at (7, 0, 4.5) m"),
         (cmd.SetTarget((7.0, 0.0, 4.5), 0.3), "Target at (7, 0, 4.5) m, radius 0.3 m"),
         (cmd.SetHeading(-math.pi / 2), "Heading 270°"),
+        (cmd.SetDepth(2.5), "Depth 2.5 m"),
         (cmd.ManualControl((0.0,) * 6), "Sticks moved"),
         (cmd.AddObstacle(4, (1.0, 2.0, 3.0), 0.5), "Obstacle 4 at (1, 2, 3) m, radius 0.5 m"),
         (cmd.RemoveObstacle(4), "Obstacle 4 gone"),

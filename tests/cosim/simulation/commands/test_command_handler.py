@@ -118,6 +118,17 @@ def test_depth_hold_holds_depth_and_follows_the_vertical_stick(fly):
     assert np.ptp(depth[2500:]) < 0.05
 
 
+@pytest.mark.medium
+def test_commanded_depth_is_kept_in_depth_hold_until_the_vertical_stick_moves(fly):
+    commands = {0: [cmd.SetMode("depth_hold")], 200: [cmd.SetDepth(4.5)], 2500: [sticks(0, 0, -1.0, 0, 0, 0)],
+                2700: [sticks(0, 0, 0, 0, 0, 0)]}  # fmt: skip
+    run = fly(commands, "time.duration=40", *OPEN)
+    depth = run.position[:, 2]
+    assert np.diff(depth).max() * STEPS < 0.45 and depth.max() < 4.75
+    assert np.abs(depth[2300:2500] - 4.5).max() < 0.05
+    assert depth[-1] < 4.2 and np.ptp(depth[3700:]) < 0.05
+
+
 def test_yaw_stick_sets_a_rate_and_heading_is_held_afterwards(fly):
     commands = {0: [cmd.SetMode("stabilize"), sticks(0, 0, 0, 0, 0, 0.25)], 400: [sticks(0, 0, 0, 0, 0, 0)]}
     yaw = np.unwrap(fly(commands, "time.duration=10", *OPEN)["attitude.yaw"])

@@ -34,6 +34,7 @@ COMMANDS_LOG = st.one_of(
     st.builds(cmd.SetMode, st.sampled_from(cmd.MODES)),
     st.builds(cmd.SetTarget, place, st.none() | radius, st.tuples(*[st.floats(-9, 9)] * 3)),
     st.builds(cmd.SetHeading, number),
+    st.builds(cmd.SetDepth, number),
     st.builds(cmd.ManualControl, st.tuples(*[st.floats(-1, 1)] * 6)),
     st.builds(cmd.AddObstacle, st.integers(0, 1 << 16), place, radius),
     st.builds(cmd.RemoveObstacle, st.integers(0, 1 << 16)),
