@@ -99,10 +99,10 @@ def make_model(scenario: Scenario, law: Law, clock: Integers = NO_CLOCK, for_rec
 class NoiseSource:
     """Draws the noise of position and linear velocity of control steps, in turn."""
 
-    def __init__(self, scenario: Scenario, rows: int) -> None:
+    def __init__(self, scenario: Scenario, rows: int, rng: np.random.Generator | None = None) -> None:
         sensing = scenario.sensing
         self._deviation: Array = np.repeat([sensing.position_noise, sensing.velocity_noise], 3)
-        self._rng, self._drawn = np.random.default_rng([sensing.seed, STREAM]), 0
+        self._rng, self._drawn = rng or np.random.default_rng([sensing.seed, STREAM]), 0
         none = sensing.exact or sensing.through == "sensors"
         self.values: Array = np.zeros((0 if none else rows, 6))  # [m, m/s]; control step c is in row c modulo rows
 

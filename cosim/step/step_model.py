@@ -22,7 +22,7 @@ from cosim.step.region_positions import RegionEvaluation
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-_WORDS = (POINTER,)  # argument of the C functions of `StepData.calls`
+WORDS = (POINTER,)  # argument of the C functions of `StepData.calls`
 
 # indices in `StepData.calls`: law, arbiter, what a run does after measuring and after evaluating the regions, and the
 # functions of a plant in Python, which send changed parameters and step it
@@ -158,7 +158,7 @@ def set_call(data: StepData, which: int, call: Call) -> None:
 def call_back(data: StepData, call: int) -> None:
     """Call a C function of `StepData.calls`, if there is one."""
     if data.calls[call] != 0:
-        call_c(data.calls[call], _WORDS, data.calls[call + 1])
+        call_c(data.calls[call], WORDS, data.calls[call + 1])
 
 
 def _end_step(data: StepData) -> None:
