@@ -19,6 +19,7 @@ WRITES = {
 }
 SAYS = {
     "fmu_alone.py": "14 inputs",
+    "learn_to_hold.py": "generation 29: ",
     "master.py": "clearance to the goal region +",
     "own_law.py": "law own_law.py:steer: in the goal after",
     "own_vehicle.py": "for good: True",

@@ -2,7 +2,7 @@
 
 After ``import cosim.learning``, `gymnasium.make` knows them as ``subreach/Region-v0``.
 
-Imports: batch, controller, plant_fmu, results, scenario, simulation, step.
+Imports: batch, controller, plant_fmu, results, scenario, simulation, simulation.commands, step.
 """
 
 import gymnasium

@@ -110,7 +110,7 @@ class _Flight:
             raise PlantError(f"{self.scenario.name}: the plant has no outputs at the beginning")
 
 
-class RegionEnv(gymnasium.Env[Array, Array]):
+class RegionEnv(gymnasium.Env[Any, Any]):
     """Steer the vehicle of a scenario by wrenches; ``gymnasium.make("subreach/Region-v0", scenario="docking")``.
 
     An episode is a run of the scenario, a step a control period of it. It ends when the vehicle has been in the goal
@@ -197,7 +197,7 @@ class RegionEnv(gymnasium.Env[Array, Array]):
         return self._seen.astype(np.float32)
 
 
-class RegionVectorEnv(VectorEnv[Array, Array, Array]):
+class RegionVectorEnv(VectorEnv[Any, Any, Any]):
     """Several `RegionEnv` side by side in one process; ``gymnasium.make_vec("subreach/Region-v0", num_envs=16)``.
 
     Parameters are those of `RegionEnv`. An episode that has ended begins anew in the next step, with a reward of 0.
@@ -220,6 +220,7 @@ class RegionVectorEnv(VectorEnv[Array, Array, Array]):
         arrays = zip(self._wrenches, self._seen, self._outcomes, strict=True)
         self._flights = [_Flight(self._setup, *own) for own in arrays]
         self._calls = np.zeros(2 * num_envs, np.int64)
+        self._random: list[Any] = [None] * num_envs
         self._advance = BoundCall(call_each, (self._calls,))
 
     def reset(
@@ -227,18 +228,19 @@ class RegionVectorEnv(VectorEnv[Array, Array, Array]):
     ) -> tuple[Array, dict[str, Any]]:
         """Begin all episodes; return their first observations (flights, n)."""
         seeds = seed if isinstance(seed, list) else [None if seed is None else seed + i for i in range(self.num_envs)]
-        self._random = [np.random.default_rng(one) for one in seeds]
-        for i in range(self.num_envs):
+        for i, one in enumerate(seeds):
+            if one is not None or self._random[i] is None:
+                self._random[i] = np.random.default_rng(one)
             self._begin(i)
         return self._seen.astype(np.float32), {}
 
-    def step(self, actions: Array) -> tuple[Array, Array, Array, Array, dict[str, Any]]:
+    def step(self, actions: Array) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Hold wrenches (flights, 6) for a control period; return what `RegionEnv.step` returns, as arrays."""
         np.multiply(np.minimum(np.maximum(actions, -1.0), 1.0), self._setup.scale, out=self._wrenches)
         ended = self._ended.nonzero()[0] if self._ended.any() else ()
         self._advance.call()
         for i in ended:
-            self._begin(i)
+            self._begin(int(i))
         terminated, truncated = self._outcomes[:, TERMINATED] > 0.0, self._outcomes[:, TRUNCATED] > 0.0
         self._ended = terminated | truncated
         return self._seen.astype(np.float32), self._outcomes[:, REWARD].copy(), terminated, truncated, {}

@@ -13,7 +13,7 @@ from tests.architecture.rooms import ROOMS, arrows, imports_of, room_of, stated_
 # the rooms of cosim from the ground up: each imports rooms above it in this list, and none below
 FLOORS = (
     "io", "scenario", "step", "simulation", "results", "batch", "ssp", "replay", "mavlink", "report", "export", "live",
-    "precheck", "run", "logs", "companion", "identification", "sitl", "campaigns", "command_line",
+    "precheck", "run", "logs", "companion", "identification", "sitl", "campaigns", "learning", "command_line",
 )  # fmt: skip
 MOST_MODULES = 20  # in one room
 MOST_AT_THE_ROOT = 8  # modules of cosim
@@ -26,6 +26,7 @@ ONE_PLACE = {
     "google": {"cosim.export.foxglove_scene", "cosim.export.protobuf_table"},
     "mcap": {"cosim.export.mcap_writer", "cosim.logs.bag_storage"},
     "mcap_protobuf": {"cosim.export.mcap_writer"},
+    "gymnasium": {"cosim.learning", "cosim.learning.region_env"},
     "numba": {"fuzzy_arbiter.export.python"},
     "pandas": {"cosim.results.run_result"},
     "pymavlink": {"cosim.mavlink.wire.dialect", "cosim.logs.formats.dataflash"},
@@ -46,12 +47,13 @@ ONE_PLACE = {
 
 # of these, what the base install does not bring, and the modules that cannot be imported without it
 OPTIONAL = {
-    "dask", "distributed", "foxglove_schemas_protobuf", "google", "mcap", "mcap_protobuf", "pandas", "rerun", "rosbags",
+    "dask", "distributed", "foxglove_schemas_protobuf", "google", "gymnasium", "mcap", "mcap_protobuf", "pandas",
+    "rerun", "rosbags",
 }  # fmt: skip
 WANT_AN_EXTRA = {
     f"cosim.export.{name}"
     for name in ("mcap_writer", "rrd_writer", "rosbag2_writer", "foxglove_scene", "protobuf_table")
-}
+} | {"cosim.learning", "cosim.learning.region_env", "cosim.learning.control_period"}
 
 # what shows a run while it goes on: a run that nobody watches does without
 OF_SHOWING = {"pymavlink", "rich", "websockets"}

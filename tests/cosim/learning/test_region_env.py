@@ -6,7 +6,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import cosim
-import cosim.learning  # noqa: F401 -- it registers the environment
+import cosim.learning
 from cosim.batch.fused import FusedFlyer
 from cosim.batch.variation import Variation
 from cosim.errors import RunError, ScenarioError
@@ -111,7 +111,7 @@ def test_a_violation_costs_ten_times_its_integral(make):
     env.reset(seed=0)
     rewards, truncated, n = [], False, 0
     while not truncated:
-        observation, reward, _, truncated, info = env.step(np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
+        _, reward, _, truncated, info = env.step(np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
         rewards.append(reward)
         n += 1
     assert n == 200 and info["violated"] and sum(rewards) < -1.0
