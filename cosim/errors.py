@@ -32,7 +32,9 @@ class ExportError(CosimError):
 
 
 class ImportLogError(CosimError):
-    """A vehicle's log that cannot be imported as a run."""
+    """A vehicle's log that cannot be imported as a run; `draft` is a column map for one that lacks it."""
+
+    draft = ""
 
 
 class IdentificationError(CosimError):

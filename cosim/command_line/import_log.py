@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.command_line.flags import add_verb, flag, float_range
-from cosim.command_line.process import print_run, say_if_interrupted
+from cosim.command_line.process import print_run, say, say_if_interrupted
 
 _BAR = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
@@ -20,11 +20,12 @@ def add_verbs(verbs: Any) -> None:
          "import dive.csv --vehicle mine.toml --map columns.toml --scenario pool.toml"),
     )  # fmt: skip
     verb.add_argument(
-        "log", type=Path, metavar="LOG", help=".bin, .tlog, .ulg, .csv, .parquet, .mcap, .db3, .bag or a bag's folder"
-    )
+        "logs", type=Path, nargs="+", metavar="LOG",
+        help=".bin, .tlog, .ulg, .csv, .parquet, .mcap, .db3, .bag or a bag's folder; several of one run are joined",
+    )  # fmt: skip
     flag(verb, "--vehicle NAME", "a shipped vehicle or a TOML file, whose thrusters are driven", required=True)
     flag(verb, "--scenario NAME", "shipped name or TOML file, whose goal and regions judge it (default: none)")
-    flag(verb, "--map FILE", "column map, for tables and bags of ROS", Path)
+    flag(verb, "--map FILE", "column map, for tables and bags of ROS; without one a draft is printed", Path)
     flag(verb, "--rate HZ", "rows per second (default: by the log)", float_range(1e-3, 1e4))
     curves = "linear", "quadratic", "t200"
     flag(verb, "--curve", "curve from servo pulse to force (default: that of the vehicle's file)", choices=curves)
@@ -36,17 +37,24 @@ def add_verbs(verbs: Any) -> None:
 
 def import_(options: argparse.Namespace) -> int:
     """Run ``cosim import``."""
+    from cosim.errors import ImportLogError
     from cosim.logs import import_log
+    from cosim.results.log_facts import load_log_facts
     from cosim.run.progress import ProgressBar
 
     def run() -> None:
-        with ProgressBar(not options.quiet, _BAR, total=1.0, desc=options.log.name) as bar:
+        with ProgressBar(not options.quiet, _BAR, total=1.0, desc=options.logs[0].name) as bar:
             done = import_log(
-                options.log, options.vehicle, options.out,
+                options.logs, options.vehicle, options.out,
                 scenario=options.scenario, columns=options.map, rate=options.rate, curve=options.curve,
                 voltage=options.voltage, report=not options.no_report, overwrite=options.overwrite,
                 on_progress=bar.update_to,
             )  # fmt: skip
+        say(options, *load_log_facts(done.folder).remarks)
         print_run(options, done, not options.no_report)
 
-    return say_if_interrupted(run, "nothing is written, and the same command begins again")
+    try:
+        return say_if_interrupted(run, "nothing is written, and the same command begins again")
+    except ImportLogError as error:
+        print(error.draft, end="")
+        raise

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.errors import IdentificationError
-from cosim.results.log_facts import COMMAND_TIME, IMPORT, TopicFacts, load_log_facts
+from cosim.results.log_facts import ATTITUDE_TIME, COMMAND_TIME, IMPORT, TopicFacts, load_log_facts
 from cosim.results.record import Record, load_record
 from cosim.results.run_result import SCENARIO
 from cosim.simulation.signals import Array
@@ -39,7 +39,7 @@ _COLUMNS: dict[str, tuple[tuple[str, str, str], ...]] = {
     "velocity": (("measured.velocity.", "uvw", "measured.time.dvl"), ("sensed.", "uvw", ""), ("velocity.", "uvw", "")),
     "angular_velocity": (("measured.angular_velocity.", "pqr", "measured.time.imu"), ("velocity.", "pqr", "")),
     "depth": (("measured.depth", "", "measured.time.depth_sensor"), ("position.", "z", "")),
-    "attitude": (("sensed.e", "0123", ""), ("quaternion.e", "0123", "")),
+    "attitude": (("measured.attitude.e", "0123", ATTITUDE_TIME), ("sensed.e", "0123", ""), ("quaternion.e", "0123", "")),
     "position": (
         ("measured.position.", "xyz", "measured.time.usbl"), ("sensed.", "xyz", ""), ("position.", "xyz", ""),
     ),

@@ -15,7 +15,6 @@ from cosim.errors import ImportLogError
 from cosim.logs.bag_storage import DAMAGE, MAX_DECODED, StoredMessage, stored_messages
 from cosim.logs.chunked_file import OnProgress
 from cosim.logs.clocks import Clock
-from cosim.logs.column_map import require_map
 from cosim.logs.spool import LogContents
 from cosim.logs.vehicle_messages import AUTOPILOT, MESSAGES, NO_AUTOPILOT, VehicleMessages
 from cosim.mavlink.wire.dialect import dialect
@@ -25,9 +24,10 @@ _ALL_MESSAGES = "mavlink/out"  # topic of all messages; each is also recorded wi
 _ONE_KIND = re.compile(r"mavlink/\d+/\d+/[A-Z0-9_]+")
 
 
-def read_recording(path: Path, contents: LogContents, on_progress: OnProgress) -> None:
-    """Read a recording, or the folder with the recordings of a dive."""
-    by_kind, vehicle = _find_vehicle(path)
+def read_recording(
+    path: Path, by_kind: bool, vehicle: tuple[int, int, int], contents: LogContents, on_progress: OnProgress
+) -> None:
+    """Read a recording, or the folder with the recordings of a dive, of what `find_vehicle` has found."""
     clock, messages = Clock(), VehicleMessages(contents, *vehicle)
     kinds = {kind.msgname: kind for kind in dialect().mavlink_map.values()}
     for stored in stored_messages(path, contents.remarks, on_progress):
@@ -49,8 +49,8 @@ def read_recording(path: Path, contents: LogContents, on_progress: OnProgress) -
     contents.remarks += clock.remarks("The clock of the recorder")
 
 
-def _find_vehicle(path: Path) -> tuple[bool, tuple[int, int, int]]:
-    """Find the autopilot: return True if each kind of message has a topic, and the autopilot's identity."""
+def find_vehicle(path: Path) -> tuple[bool, tuple[int, int, int]] | None:
+    """Return True if each kind of message has a topic, and the autopilot's identity; None for a bag without MAVLink."""
     # The identity is system id, MAV_AUTOPILOT and MAV_TYPE.
     vehicle, any_mavlink = None, False
     for stored in stored_messages(path, [], lambda fraction: None):
@@ -67,7 +67,7 @@ def _find_vehicle(path: Path) -> tuple[bool, tuple[int, int, int]]:
                 if by_kind:
                     return True, vehicle
     if not any_mavlink:
-        require_map(None)
+        return None
     if vehicle is None:
         raise ImportLogError("holds no heartbeat of an autopilot, expected a recording of a vehicle")
     return False, vehicle

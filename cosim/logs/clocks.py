@@ -6,12 +6,14 @@ import math
 
 import numpy as np
 
+from cosim.logs.sample_times import is_shuffled
 from cosim.simulation.signals import Array
 
 _MAX_STEP_BACK = 1.0  # s; a step back by more is a jump, not a message out of order
 _MAX_STEP_AHEAD = 3600.0  # s; a step ahead by more is a jump, not a pause
 _PAUSE = 1.0  # s, assumed duration of a jump
 _WINDOW = 60.0  # s of the vehicle's clock, in which only the message of smallest delay is used
+_MAX_LISTED = 12  # jumps that are listed
 _MAX_DRIFT = 5e-4  # relative drift above which a fit is discarded
 
 
@@ -37,11 +39,15 @@ class Clock:
         return time
 
     def times(self, readings: Array) -> Array:
-        """Return the times [s] of clock readings [s], shape (n,)."""
+        """Return the times [s] of clock readings [s], shape (n,); those of readings out of order are as they are."""
+        if is_shuffled(readings[np.isfinite(readings)]):
+            return readings
         return np.array([self.time(reading) for reading in readings.tolist()])
 
     def remarks(self, name: str) -> list[str]:
         """Return a sentence for each jump of a clock with a name."""
+        if len(self.jumps) > _MAX_LISTED:
+            return [f"{name} jumps {len(self.jumps)} times: each is taken as a pause of 1 s."]
         return [f"{name} jumps by {step:+.4g} s: it is taken as a pause of 1 s." for _, step in self.jumps]
 
     def is_behind(self, reading: float) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Container
 from pathlib import Path
 from typing import Literal
 
@@ -20,6 +21,7 @@ from plant_fmu.toml_tables import Table, decode, read_toml
 
 _ORDER = re.compile(r"[XYZ]{3}|[xyz]{3}")
 _MAX_ODD = 0.1  # maximum fraction of quaternions of a length other than 1, which are treated as missing
+_MAX_ANGLE = 2.0 * np.pi + 0.01  # rad
 World = Literal["NED", "ENU", "NWU"]
 Body = Literal["FRD", "FLU", "RFU"]
 
@@ -37,6 +39,11 @@ class MappedQuantity(Table, frozen=True):
     columns: tuple[str, ...] = ()
     unit: str | None = None  # default: the SI unit
     topic: str = ""  # topic of the messages in a bag
+    file: str = ""  # pattern of the log's name, such as *wrench*.csv; empty: the first log that has the columns
+    valid: str = ""  # column that is 0 where a sample is invalid
+    invalid: tuple[float, ...] = ()  # markers of invalid samples, in the unit of the columns
+    min: float = -np.inf  # bounds of valid values, in the unit of the columns
+    max: float = np.inf
     time: TimeColumn | None = None  # default: that of the map
     euler: str = ""  # axes of Euler angles, in the order of the columns; capital letters: rotations about body axes
     quaternion: Literal["wxyz", "xyzw"] = "wxyz"  # order of the components
@@ -44,6 +51,20 @@ class MappedQuantity(Table, frozen=True):
     sign: Literal[1, -1] = 1  # factor of the values; -1 for a depth or an altitude of the opposite direction
     world: World | None = None  # default: that of the map
     body: Body | None = None  # default: that of the map
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Columns that hold values and their validity."""
+        return (*self.columns, *([self.valid] if self.valid else []))
+
+    def is_valid(self, values: Array, flags: Array | None) -> NDArray[np.bool_]:
+        """Return True for valid samples; values (n, size) in the unit of the columns, flags (n,)."""
+        valid = np.all((values >= self.min) & (values <= self.max), axis=1)
+        for marker in self.invalid:
+            match = np.isclose(values, marker, rtol=1e-6, atol=1e-9)
+            valid &= ~(match.any(axis=1) if marker else match.all(axis=1))
+        result: NDArray[np.bool_] = valid if flags is None else valid & (np.nan_to_num(flags) != 0.0)
+        return result
 
 
 class ColumnMap(Table, frozen=True):
@@ -65,12 +86,18 @@ class ColumnMap(Table, frozen=True):
         mapped = self.quantities[name]
         return mapped.time or self.time
 
-    def put(self, contents: LogContents, name: str, times: Array, values: Array) -> None:
+    def put(
+        self, contents: LogContents, name: str, times: Array, values: Array, is_valid: NDArray[np.bool_]
+    ) -> None:  # fmt: skip
         """Convert samples of a quantity from the map's unit and frame, and add them to the contents of a log."""
         # Units of arguments: times [s]
         mapped = self.quantities[name]
         source = contents.source(name, source_name(mapped), QUANTITIES[name].size or len(mapped.columns))
-        source.put_many(times, self._converted(name, mapped, values))
+        source.put_many(times, self._converted(name, mapped, np.where(is_valid[:, None], values, np.nan)))
+
+    def only(self, names: Container[str]) -> ColumnMap:
+        """Return the map with some of its quantities."""
+        return msgspec.structs.replace(self, **{name: None for name in self.quantities if name not in names})
 
     def _converted(self, name: str, mapped: MappedQuantity, values: Array) -> Array:
         quantity = QUANTITIES[name]
@@ -92,13 +119,6 @@ _FileMap = msgspec.defstruct(
 )  # fmt: skip
 
 
-def require_map(columns: ColumnMap | None) -> ColumnMap:
-    """Return a map; raise ImportLogError if there is none."""
-    if columns is None:
-        raise ImportLogError("needs a column map, expected --map FILE: it says which column is what")
-    return columns
-
-
 def source_name(mapped: MappedQuantity) -> str:
     """Return the name of a quantity's columns in a report."""
     shown = ", ".join(mapped.columns[:3]) + (" ..." if len(mapped.columns) > 3 else "")
@@ -110,7 +130,9 @@ def _attitudes(mapped: MappedQuantity, values: Array, world: str, body: str) -> 
     if mapped.euler:
         angles = values[known] * UNITS["rad"][mapped.unit or "rad"]
         _require_angles(mapped, angles)
-        quaternions = quaternions_of_angles(angles, mapped.euler)
+        odd = np.abs(angles).max(axis=1, initial=0.0) > _MAX_ANGLE
+        known[np.flatnonzero(known)[odd]] = False
+        quaternions = quaternions_of_angles(angles[~odd], mapped.euler)
     else:
         quaternions = values[known] if mapped.quaternion == "wxyz" else values[known][:, [3, 0, 1, 2]]
         length = np.hypot.reduce(quaternions, axis=1)
@@ -131,8 +153,9 @@ def _attitudes(mapped: MappedQuantity, values: Array, world: str, body: str) -> 
 
 
 def _require_angles(mapped: MappedQuantity, angles: Array) -> None:
-    size = float(np.abs(angles).max(initial=0.0))
-    if size > 2.0 * np.pi + 0.01:
+    sizes = np.abs(angles).max(axis=1, initial=0.0)
+    size = float(sizes.max(initial=0.0))
+    if np.count_nonzero(sizes > _MAX_ANGLE) > _MAX_ODD * len(sizes):
         raise ImportLogError(
             f"{source_name(mapped)}: attitude reaches {size:.4g} rad, expected at most 6.293 rad: "
             'check its unit, such as unit = "deg"'

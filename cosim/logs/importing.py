@@ -7,7 +7,7 @@ import dataclasses
 import itertools
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,17 +18,18 @@ import numpy as np
 from cosim.errors import ImportLogError, RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
+from cosim.logs.alignment import clock_offset
+from cosim.logs.assignment import assign_quantities, format_of
 from cosim.logs.chunked_file import OnProgress
 from cosim.logs.clocks import VehicleClock
-from cosim.logs.column_map import read_map
+from cosim.logs.column_map import ColumnMap
 from cosim.logs.forces import CURVES, CommandForces, command_forces
-from cosim.logs.formats import BAGS, FORMATS, LogFormat
 from cosim.logs.quantities import COMMANDS
 from cosim.logs.rows import RowMaker
-from cosim.logs.selection import default_rate, select_topics, time_span
+from cosim.logs.selection import default_rate, has_plausible_rate, select_topics, time_span
 from cosim.logs.spool import LogContents
 from cosim.logs.topics import Topic
-from cosim.results.log_facts import COMMAND_TIME, IMPORT, LogFacts, TopicFacts
+from cosim.results.log_facts import ATTITUDE, ATTITUDE_TIME, COMMAND_TIME, IMPORT, LogFacts, TopicFacts
 from cosim.results.record import MAX_ROWS
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import Run
@@ -49,7 +50,7 @@ _MAX_GAPS = 12  # gaps of a topic in a report
 
 
 def import_log(
-    log: str | Path,
+    log: str | Path | Sequence[str | Path],
     vehicle: str | Path,
     out: str | Path | None = None,
     *,
@@ -67,9 +68,9 @@ def import_log(
 
     Parameters
     ----------
-    log : str or Path
+    log : str, Path or sequence of these
         Path of a log: ``.bin``, ``.tlog``, ``.ulg``, ``.csv``, ``.parquet``, or a bag: ``.mcap``, ``.db3``, ``.bag``,
-        or its folder.
+        or its folder. Several logs of one run are joined on the clock of the first.
     vehicle : str or Path
         Name of a shipped vehicle or path of a TOML file, with the thrusters that the commands drive.
     out : str or Path, optional
@@ -121,32 +122,49 @@ def import_log(
     >>> run.summary["status"], len(run.record)
     ('imported', 50)
     """
-    path, report_progress = Path(log), _progress_callback(on_progress, moved)
+    paths = [Path(x) for x in ([log] if isinstance(log, str | Path) else log)]
+    report_progress = _progress_callback(on_progress, moved)
+    path = paths[0] if paths else Path()
     try:
-        form = _format_of(path)
-        if columns is not None and not form.takes_map:
-            raise ImportLogError("a column map is given, expected none: its messages say what they are")
-        column_map = None if columns is None else read_map(Path(columns))
+        if not paths:
+            raise ImportLogError("no log is given, expected one at the least")
         loaded = load_vehicle(Path(vehicle) if str(vehicle).endswith(".toml") else str(vehicle))
         if curve is not None and curve not in CURVES:
             raise ImportLogError(f"curve is {curve!r}, expected one of {', '.join(CURVES)}")
+        logs = assign_quantities(paths, None if columns is None else Path(columns))
         # a log may hold any numbers, also such that overflow
         with temporary_folder("cosim-import-") as scratch, np.errstate(all="ignore"):
-            contents = LogContents(scratch)
-            try:
-                form.read(path, column_map, contents, report_progress)
-            except ModuleNotFoundError as error:
-                if not form.needs or (error.name or "").startswith("cosim"):
-                    raise
-                raise ImportLogError(f"needs {error.name}; {install_hint(*form.needs)}") from error
-            _require_vehicle(contents, loaded)
+            parts = []
+            for k, (path, own_map) in enumerate(logs):
+                (scratch / str(k)).mkdir()
+                parts.append(LogContents(scratch / str(k)))
+                _read(path, own_map, parts[k], lambda part, k=k: report_progress((k + part) / len(logs)))
+                if k:
+                    offset, found = clock_offset(parts[0], parts[k])
+                    parts[0].remarks.append(f"Clocks of {logs[0][0].name} and {path.name} are joined {found}.")
+                    parts[0].join(parts[k], offset)
+            path = logs[0][0]
+            _require_vehicle(parts[0], loaded)
             folder = None if out is None else Path(out)
             options = _Options(str(vehicle), scenario, folder, rate, curve, voltage, report, overwrite)
-            return _write(path, contents, scratch, loaded, options)
+            return _write([path for path, _ in logs], parts[0], scratch, loaded, options)
     except ImportLogError as error:
-        raise ImportLogError(f"{path}: {error}") from error
+        named = ImportLogError(f"{path}: {error}")
+        named.draft = error.draft
+        raise named from error
     except OSError as error:
         raise ImportLogError(f"{path}: {error.strerror or error}") from error
+
+
+def _read(path: Path, column_map: ColumnMap | None, contents: LogContents, on_progress: OnProgress) -> None:
+    """Read a log into its contents; name the packages that it needs."""
+    form = format_of(path)
+    try:
+        form.read(path, column_map, contents, on_progress)
+    except ModuleNotFoundError as error:
+        if not form.needs or (error.name or "").startswith("cosim"):
+            raise
+        raise ImportLogError(f"needs {error.name}; {install_hint(*form.needs)}") from error
 
 
 def _progress_callback(on_progress: OnProgress | None, moved: OnProgress | None) -> OnProgress:
@@ -155,19 +173,6 @@ def _progress_callback(on_progress: OnProgress | None, moved: OnProgress | None)
             raise ImportLogError("moved is the former name of on_progress, expected one of them")
         warnings.warn("moved is now on_progress", DeprecationWarning, stacklevel=3)
     return on_progress or moved or (lambda fraction: None)
-
-
-def _format_of(path: Path) -> LogFormat:
-    if path.is_dir():
-        return BAGS
-    form = FORMATS.get(path.suffix.lower())
-    if form is None:
-        raise ImportLogError(f"ends in {path.suffix!r}, expected one of {', '.join(sorted(FORMATS))}")
-    if not path.is_file():
-        raise ImportLogError("is a device, expected a file" if path.exists() else "no such file")
-    if not path.stat().st_size:
-        raise ImportLogError("is empty, expected a log")
-    return form
 
 
 def _require_vehicle(contents: LogContents, vehicle: Vehicle) -> None:
@@ -197,8 +202,9 @@ class _Options:
     overwrite: bool
 
 
-def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, options: _Options) -> Run:
+def _write(paths: Sequence[Path], contents: LogContents, scratch: Path, vehicle: Vehicle, options: _Options) -> Run:
     """Write the contents of a log as a run folder."""
+    path = paths[0]
     topics, clock = select_topics(contents, scratch)
     command = next((topics[name] for name in COMMANDS if name in topics), None)
     for name in COMMANDS:
@@ -222,11 +228,14 @@ def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, o
     columns = columns_without_plant(draft)
     if commands:
         columns.append(Column(COMMAND_TIME, "s", "When the commands were sampled"))
+    if "attitude" in topics:
+        columns += [Column(name, "", "Last sample of the attitude, from body to world") for name in ATTITUDE]
+        columns.append(Column(ATTITUDE_TIME, "s", "When the attitude was sampled"))
     maker = RowMaker(draft, columns, topics, commands, volts, start)
     with contextlib.closing(maker.blocks()) as blocks:
         first = next(blocks)
     scenario = _with_first_pose(draft, first, [column.name for column in columns], contents.autopilot or "log")
-    facts = _facts(path, contents, topics, commands, clock, hertz, start)
+    facts = _facts(paths, contents, topics, commands, clock, hertz, start)
     folder = claim(options.out, scenario, options.overwrite)
     try:
         recorder = Recorder(folder.path, columns)
@@ -278,16 +287,29 @@ def _with_first_pose(scenario: Scenario, rows: Array, names: list[str], law: str
 
 
 def _facts(
-    path: Path, contents: LogContents, topics: Mapping[str, Topic], commands: CommandForces | None, clock: VehicleClock,
-    hertz: float, start: float,
+    paths: Sequence[Path], contents: LogContents, topics: Mapping[str, Topic], commands: CommandForces | None,
+    clock: VehicleClock, hertz: float, start: float,
 ) -> LogFacts:  # fmt: skip
     """Return the facts about the log that the run records."""
     remarks = [*contents.remarks, *([f"Clocks: {clock.summary()}."] if clock.summary() else [])]
-    files = [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
-    size = sum(file.stat().st_size for file in files)
+    entries = [_topic_facts(topic, start) for topic in topics.values()]
+    for topic, entry in zip(topics.values(), entries, strict=True):
+        name = f"{entry.quantity} ({entry.source})"
+        if entry.repairs:
+            remarks.append(f"{name}: {entry.repairs}; {entry.samples} samples are left.")
+        if topic.frozen:
+            remarks.append(f"{name} {topic.frozen}")
+        if not has_plausible_rate(topic):
+            remarks.append(f"{name} has {topic.rate:.3g} samples per second: check the unit of its time.")
+    size = sum(
+        file.stat().st_size
+        for path in paths
+        for file in (path.iterdir() if path.is_dir() else [path])
+        if file.is_file()
+    )
     return LogFacts(
-        printable(path.name), size, start, hertz, commands.summary if commands else "",
-        tuple(_topic_facts(topic, start) for topic in topics.values()),
+        printable(", ".join(path.name for path in paths)), size, start, hertz, commands.summary if commands else "",
+        tuple(entries),
         {printable(name): count for name, count in contents.unread.most_common()},
         tuple(printable(remark) for remark in remarks),
     )  # fmt: skip
@@ -297,5 +319,5 @@ def _topic_facts(topic: Topic, start: float) -> TopicFacts:
     gaps = tuple((begin - start, end - start) for begin, end in topic.gaps[:_MAX_GAPS])
     return TopicFacts(
         topic.quantity, printable(topic.name), topic.count, topic.rate, topic.longest, topic.gap_count, gaps,
-        topic.held, topic.burst, topic.late, topic.broken,
+        topic.held, topic.burst, topic.late, topic.broken, topic.duplicates, topic.sorted, topic.outliers,
     )  # fmt: skip

@@ -13,7 +13,7 @@ from cosim.logs.forces import CommandForces
 from cosim.logs.frames import euler_zyx, rotate_to_body
 from cosim.logs.resampling import TopicReader
 from cosim.logs.topics import Topic
-from cosim.results.log_facts import COMMAND_TIME
+from cosim.results.log_facts import ATTITUDE, ATTITUDE_TIME, COMMAND_TIME
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.signals import Array, Column
@@ -25,6 +25,12 @@ BLOCK = 4096  # rows that are made at once
 _SPAN = 60.0  # s, maximum duration of these rows: at a low rate, the samples between rows are in memory too
 _POSITION, _QUATERNION = [f"position.{a}" for a in "xyz"], [f"quaternion.e{i}" for i in range(4)]
 _WRENCH = "XYZKMN"
+_SAMPLES = {  # quantity: columns of its samples, time column, and quantities in whose absence these are of it
+    "velocity": (tuple(f"measured.velocity.{a}" for a in "uvw"), "measured.time.dvl", ("dvl", "altitude")),
+    "rates": (tuple(f"measured.angular_velocity.{a}" for a in "pqr"), "measured.time.imu", ("gyro", "acceleration")),
+    "position": (tuple(f"measured.position.{a}" for a in "xyz"), "measured.time.usbl", ("fix",)),
+    "attitude": (ATTITUDE, ATTITUDE_TIME, ()),
+}
 _SENSORS = {  # quantity: columns, and name of the sensor's time column
     "depth": (("measured.depth",), "depth_sensor"),
     "dvl": (tuple(f"measured.velocity.{a}" for a in "uvw"), "dvl"),
@@ -75,6 +81,11 @@ class RowMaker:
                 put([f"measured.time.{sensor}"], (when - self.start)[:, None])
                 if quantity == "altitude":
                     put(["altitude"], values)
+        for quantity, (names, stamp, others) in _SAMPLES.items():
+            if quantity in readers and not any(other in readers for other in others):
+                values, when = readers[quantity].hold(log_time)
+                put(names, values)
+                put([stamp], (when - self.start)[:, None])
         if self.commands is not None:
             self._put_commands(put, readers, log_time, self.commands)
 

@@ -21,6 +21,7 @@ _MOTION = ("attitude", "position", "depth")  # quantities of which a log must ha
 _SEA_LEVEL, _SPECIFIC = 101325.0, 9800.0  # Pa, Pa/m: ArduPilot's conversion of pressure to depth
 # parameters of ArduPilot with the cutoff frequency [Hz] of the filter of a quantity
 _FILTERS = {"rates": "INS_GYRO_FILTER", "gyro": "INS_GYRO_FILTER", "acceleration": "INS_ACCEL_FILTER"}
+_PLAUSIBLE = (0.1, 1e4)  # Hz, rates of samples
 _EDGE = 5.0  # s, duration at start and end below which rows with partly unknown motion are cut
 
 
@@ -48,7 +49,18 @@ def select_topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic
         contents.remarks.append("The log has no INS_GYRO_FILTER: rates are as late as that filter made them.")
     for when in clock.restarts:
         contents.remarks.append(f"The vehicle's clock restarted {when - time_span(topics)[0]:.1f} s after the start")
+    fastest = max(topics.values(), key=lambda topic: topic.rate)
+    if not has_plausible_rate(fastest):
+        raise ImportLogError(
+            f"has {fastest.rate:.3g} samples of {fastest.quantity} per second, expected {_PLAUSIBLE[0]:g} to "
+            f"{_PLAUSIBLE[1]:g}: check the unit of its times"
+        )
     return topics, clock
+
+
+def has_plausible_rate(topic: Topic) -> bool:
+    """Return True for a rate that a quantity of a log may have."""
+    return not topic.period or _PLAUSIBLE[0] <= topic.rate <= _PLAUSIBLE[1]
 
 
 def _filter_delay(contents: LogContents, quantity: str) -> float:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cosim.errors import ImportLogError
 from cosim.logs.quantities import QUANTITIES
@@ -32,6 +33,7 @@ class Source:
     size: int  # number of components
     count: int = 0  # number of samples
     broken: int = 0  # number of omitted samples with a number that is not finite
+    offset: float | None = None  # s, added to the times of writing, which then replace the stamps
     _pending: array[float] = field(default_factory=lambda: array("d"))
 
     def put(self, stamp: float, written: float, values: Sequence[float]) -> None:
@@ -70,7 +72,18 @@ class Source:
         width = 2 + self.size
         with self.path.open("rb") as file:
             while (block := np.fromfile(file, count=BLOCK * width)).size:
-                yield block.reshape(-1, width)
+                rows = block.reshape(-1, width)
+                if self.offset is not None:
+                    rows[:, 0], rows[:, 1] = np.nan, rows[:, 1] + self.offset
+                yield rows
+
+    def rows(self, index: NDArray[np.int64]) -> Array:
+        """Return the samples of indices, shape (n, 2 + size)."""
+        self.flush()
+        width, first = 2 + self.size, int(index.min())
+        count = int(index.max()) + 1 - first
+        samples = np.fromfile(self.path, count=count * width, offset=first * width * 8)
+        return samples.reshape(-1, width)[index - first]
 
 
 class LogContents:
@@ -106,6 +119,18 @@ class LogContents:
         """Store a parameter of the autopilot; omit one that is not finite."""
         if math.isfinite(value):
             self.parameters[name] = value
+
+    def join(self, other: LogContents, offset: float) -> None:
+        """Add the sources of another log of the run, with the time [s] that puts them on the clock of this one."""
+        for (quantity, name), source in other.sources.items():
+            source.offset = offset
+            self.sources[quantity, name if (quantity, name) not in self.sources else f"{name} (2)"] = source
+        self.unread += other.unread
+        self.remarks += other.remarks
+        self.parameters = other.parameters | self.parameters
+        self.preferences = other.preferences | self.preferences
+        self.frame, self.kind = self.frame or other.frame, self.kind or other.kind
+        self.autopilot = self.autopilot or other.autopilot
 
     def best(self, quantity: str) -> Source | None:
         """Return the source to use for a quantity: the preferred one, else the one with most samples, or None."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from controller.laws import LAWS
 from cosim.replay.events import active_region_changes
-from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts, load_log_facts
+from cosim.results.log_facts import IMPORT, LogFacts, load_log_facts
 from cosim.results.paper_claims import paper_claims
 from cosim.results.run_result import Run
 from cosim.results.spans import Spans
@@ -184,7 +184,7 @@ def _log(run: Run) -> dict[str, Any] | None:
     rows = tuple(
         (
             t.quantity, t.source, str(t.samples), format_number(t.rate, 3), str(t.gaps),
-            format_number(max((end - begin for begin, end in t.longest_gaps), default=0.0), 3), _repairs(t),
+            format_number(max((end - begin for begin, end in t.longest_gaps), default=0.0), 3), t.repairs or "–",
         )
         for t in facts.topics
     )  # fmt: skip
@@ -199,14 +199,3 @@ def _log(run: Run) -> dict[str, Any] | None:
         "commands": facts.commands or "none",
         "unread": f"{', '.join(list(facts.unread)[:_NAMED])}{more}" or "nothing",
     }
-
-
-def _repairs(topic: TopicFacts) -> str:
-    """Describe the repairs of the samples of a topic."""
-    words = (
-        (topic.held, "repeats of held values left out"),
-        (topic.bursts, "samples of bursts spread"),
-        (topic.late, "out of order left out"),
-        (topic.broken, "without a number left out"),
-    )
-    return "; ".join(f"{count} {text}" for count, text in words if count) or "–"

@@ -7,7 +7,7 @@ Imports: mavlink.wire, plant_fmu, simulation.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,11 +28,13 @@ class LogFormat:
     # messages. It imports optional packages itself, and raises ImportLogError if the file is no such log
     read: Callable[[Path, ColumnMap | None, LogContents, OnProgress], None]
     takes_map: bool = False
+    columns: Callable[[Path], Sequence[str]] | None = None  # columns of a table; None for messages
     needs: tuple[str, ...] = ()  # packages beyond the base installation, as requirements of pip
 
 
 BAGS = LogFormat(bag.read, takes_map=True, needs=("mcap>=1.2", "rosbags>=0.11.6"))  # a log may be a folder of them
 FORMATS = {  # by suffix, in small letters
     ".bin": LogFormat(dataflash.read), ".tlog": LogFormat(tlog.read), ".ulg": LogFormat(ulog.read),
-    **dict.fromkeys((".csv", ".parquet"), LogFormat(table.read, takes_map=True)), **dict.fromkeys(SUFFIXES, BAGS),
+    **dict.fromkeys((".csv", ".parquet"), LogFormat(table.read, takes_map=True, columns=table.column_names)),
+    **dict.fromkeys(SUFFIXES, BAGS),
 }  # fmt: skip

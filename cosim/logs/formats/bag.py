@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +14,17 @@ import numpy as np
 
 from cosim.errors import ImportLogError
 from cosim.logs.bag_storage import DAMAGE, MAX_DECODED, StoredMessage, bag_files, stored_messages
-from cosim.logs.blueos import read_recording
+from cosim.logs.blueos import find_vehicle, read_recording
 from cosim.logs.chunked_file import OnProgress
 from cosim.logs.clocks import Clock
-from cosim.logs.column_map import ColumnMap, require_map
+from cosim.logs.column_map import ColumnMap
+from cosim.logs.draft_map import require_map
 from cosim.logs.frames import UNITS
 from cosim.logs.message_definitions import parse_definition, reachable_types
 from cosim.logs.spool import LogContents
 from plant_fmu.toml_tables import hint
 
+_MAX_FIELDS, _MAX_ELEMENTS = 64, 16  # listed of a topic and of an array, without a map
 _BATCH_SIZE = 4096  # messages of a quantity that are written together
 _PART = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")  # a field's name or an index in a path
 _PATH = re.compile(f"({_PART.pattern})*")
@@ -31,12 +35,12 @@ Getter = Callable[[Any], float]
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progress: OnProgress) -> None:
     """Read a bag, as specified by `LogFormat`; raise ImportLogError for another file, or a missing topic or field."""
-    from rosbags.serde import SerdeError
-
-    if columns is None and all(file.suffix.lower() == ".mcap" for file in bag_files(path)):
-        read_recording(path, contents, on_progress)
-        return
-    columns = require_map(columns)
+    if columns is None:
+        recorded = all(file.suffix.lower() == ".mcap" for file in bag_files(path)) and find_vehicle(path)
+        if recorded:
+            read_recording(path, *recorded, contents, on_progress)
+            return
+        require_map(None, _fields(path))
     without_topic = next((name for name, mapped in columns.quantities.items() if not mapped.topic), None)
     if without_topic is not None:
         raise ImportLogError(f"the map says no topic for [{without_topic}], expected topic and columns")
@@ -53,7 +57,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progre
         write_time = clock.time(message.time)
         try:
             decoded = decoder.decode(message)
-        except (SerdeError, *DAMAGE):
+        except _undecodable():
             contents.unread[f"{message.topic} that cannot be decoded"] += 1
             continue
         for reader in readers[message.topic]:
@@ -124,7 +128,8 @@ class _FieldReader:
     def __init__(self, columns: ColumnMap, name: str, contents: LogContents) -> None:
         self._columns, self._name, self._contents = columns, name, contents
         mapped, time = columns.quantities[name], columns.time_of(name)
-        self._getters = [_getter(column, mapped.topic, "a number", _number) for column in mapped.columns]
+        self._getters = [_getter(column, mapped.topic, "a number", _number) for column in mapped.needs]
+        self._mapped = mapped
         self._stamp = None
         if time is not None:
             factor = UNITS["s"].get(time.unit, 1.0)
@@ -144,7 +149,43 @@ class _FieldReader:
         if self._rows:
             rows = np.array(self._rows)
             self._rows = []
-            self._columns.put(self._contents, self._name, rows[:, 0], rows[:, 1:])
+            values = rows[:, 1 : 1 + len(self._mapped.columns)]
+            is_valid = self._mapped.is_valid(values, rows[:, -1] if self._mapped.valid else None)
+            self._columns.put(self._contents, self._name, rows[:, 0], values, is_valid)
+
+
+def _fields(path: Path) -> dict[str, dict[str, float]]:
+    """Return the fields with numbers of each topic, with the messages per second."""
+    counts, times, fields = Counter[str](), dict[str, list[float]](), dict[str, list[str]]()
+    decoder = Decoder("")
+    for message in stored_messages(path, [], lambda fraction: None):
+        if message.topic not in fields:
+            fields[message.topic] = []
+            with contextlib.suppress(ImportLogError, *_undecodable()):
+                fields[message.topic] = list(islice(_numbers(decoder.decode(message), ""), _MAX_FIELDS))
+        counts[message.topic] += 1
+        times.setdefault(message.topic, [message.time, message.time])[1] = message.time
+    rates = {topic: (counts[topic] - 1) / max(end - start, 1e-9) for topic, (start, end) in times.items()}
+    return {topic: dict.fromkeys(names, rates[topic]) for topic, names in fields.items()}
+
+
+def _numbers(value: Any, path: str) -> Iterator[str]:
+    """Yield the paths of the numbers of a message, without those of its header and its covariances."""
+    if isinstance(value, int | float | np.number):
+        yield path
+    elif isinstance(value, list | tuple | np.ndarray):
+        for i, element in enumerate(value[:_MAX_ELEMENTS]):
+            yield from _numbers(element, f"{path}[{i}]")
+    for name in getattr(value, "__dataclass_fields__", ()):
+        if name not in ("header", "stamp") and "covariance" not in name and not name.startswith("_"):
+            yield from _numbers(getattr(value, name), f"{path}.{name}".lstrip("."))
+
+
+def _undecodable() -> tuple[type[Exception], ...]:
+    """Return the exceptions of a message that cannot be decoded."""
+    from rosbags.serde import SerdeError
+
+    return (SerdeError, *DAMAGE)
 
 
 def _getter(path: str, topic: str, what: str, convert: Getter) -> Getter:

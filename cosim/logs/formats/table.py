@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import csv
-from collections.abc import Iterator
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv
@@ -17,7 +21,8 @@ import pyarrow.parquet as pq
 from cosim.errors import ImportLogError
 from cosim.logs.chunked_file import OnProgress
 from cosim.logs.clocks import Clock
-from cosim.logs.column_map import ColumnMap, TimeColumn, require_map
+from cosim.logs.column_map import ColumnMap, TimeColumn
+from cosim.logs.draft_map import require_map
 from cosim.logs.frames import UNITS
 from cosim.logs.spool import LogContents
 from cosim.simulation.signals import Array
@@ -25,23 +30,57 @@ from plant_fmu.toml_tables import hint
 
 _ROWS = 2**15  # rows of a Parquet file that are read at once
 _BLOCK = 1 << 19  # bytes of a CSV file that are read at once; the reader is up to 32 such blocks ahead
-_MISSING = ["", "nan", "NaN", "NAN", "null", "NULL", "None", "N/A", "n/a", "inf", "-inf"]
+_MISSING = ["", "nan", "NaN", "NAN", "-nan", "null", "NULL", "None", "N/A", "n/a", "inf", "-inf"]
+_MARKS = {codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16", codecs.BOM_UTF8: "utf-8-sig"}
+_FLAGS = {text: int(text.lower() == "true") for text in ("true", "True", "TRUE", "false", "False", "FALSE")}
+_DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+\s*")
+_MAX_TEXTS = 0.5  # maximum fraction of a column's cells that are texts, and left out
+
+
+class _Layout(NamedTuple):
+    """Layout of a CSV file."""
+
+    names: list[str]
+    separator: str
+    encoding: str
+    decimal: str
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progress: OnProgress) -> None:
     """Read a table, as specified by `LogFormat`; raise ImportLogError if a column is missing or not numeric."""
-    columns = require_map(columns)
-    time_columns = {name: _require_time(columns, name) for name in columns.quantities}
-    names = {column for mapped in columns.quantities.values() for column in mapped.columns}
-    clocks = {time: Clock() for time in time_columns.values()}
-    texts = {time.column for time in clocks if time.unit == "iso8601"}
-    for batch in _batches(path, contents, names | {time.column for time in clocks}, texts, on_progress):
-        times = {time: clock.times(_seconds(batch, time)) for time, clock in clocks.items()}
+    layout = _layout(path)
+    if columns is None:
+        require_map(None, _rates(path, layout))
+    times_of = {name: _require_time(columns, name) for name in columns.quantities}
+    names = {column for mapped in columns.quantities.values() for column in mapped.needs}
+    stamps = {time.column: time for time in times_of.values()}
+    _require(layout.names, names | {*stamps}, contents)
+    texts = Counter[str]()
+    readings: dict[str, list[Array]] = {column: [] for column in stamps}
+    lines: list[str] = []
+    for batch in _batches(path, layout, {*stamps}, lines, lambda fraction: on_progress(0.2 * fraction)):
+        for column, time in stamps.items():
+            readings[column].append(_seconds(batch, time, layout, texts))
+    times = {}
+    for column, parts in readings.items():
+        clock = Clock()
+        times[column] = clock.times(np.concatenate(parts or [np.zeros(0)]))
+        contents.remarks += clock.remarks(f"Column {column!r}")
+    done, cells = 0, Counter[str]()
+    for batch in _batches(path, layout, names, [], lambda fraction: on_progress(0.2 + 0.8 * fraction)):
+        numbers = {column: _numbers(batch, column, layout, cells) for column in names}
+        rows = slice(done, done + batch.num_rows)
+        done += batch.num_rows
         for name, mapped in columns.quantities.items():
-            values = np.column_stack([_numbers(batch, column) for column in mapped.columns])
-            columns.put(contents, name, times[time_columns[name]], values)
-    for time, clock in clocks.items():
-        contents.remarks += clock.remarks(f"Column {time.column!r}")
+            values = np.column_stack([numbers[column] for column in mapped.columns])
+            is_valid = mapped.is_valid(values, numbers.get(mapped.valid))
+            columns.put(contents, name, times[times_of[name].column][rows], values, is_valid)
+    _remark_texts(texts + cells, done, lines, contents)
+
+
+def column_names(path: Path) -> list[str]:
+    """Return the names of a table's columns."""
+    return _layout(path).names
 
 
 def _require_time(columns: ColumnMap, name: str) -> TimeColumn:
@@ -51,42 +90,66 @@ def _require_time(columns: ColumnMap, name: str) -> TimeColumn:
     return time
 
 
-def _batches(
-    path: Path, contents: LogContents, columns: set[str], texts: set[str], on_progress: OnProgress
-) -> Iterator[Any]:
-    """Yield batches of rows with some columns."""
+def _layout(path: Path) -> _Layout:
+    """Return names, separator, encoding and decimal sign of a table."""
+    if path.suffix.lower() == ".parquet":
+        try:
+            return _Layout(pq.read_schema(path).names, "", "", ".")
+        except (pa.ArrowException, OSError) as error:
+            raise ImportLogError(f"cannot be read: {error}") from error
+    with path.open("rb") as file:
+        head = file.read(1 << 16)
+    encoding = next((name for mark, name in _MARKS.items() if head.startswith(mark)), "utf-8")
+    if encoding == "utf-8" and b"\0" in head[:200]:
+        encoding = "utf-16-le" if head[1:2] == b"\0" else "utf-16-be"
+    first, *others = head.decode(encoding, "replace").splitlines()[:20] or [""]
+    separator = max(",;\t|", key=first.count)
     try:
-        if path.suffix.lower() == ".parquet":
+        names = [name.strip() for name in next(csv.reader([first.lstrip("#% ")], delimiter=separator), [])]
+    except csv.Error as error:
+        raise ImportLogError(f"cannot be read: {error}") from error
+    cells = [cell for line in others for cell in line.split(separator)]
+    has_commas = separator != "," and any(map(_DECIMAL_COMMA.fullmatch, cells))
+    return _Layout(names, separator, encoding, "," if has_commas else ".")
+
+
+def _batches(
+    path: Path, layout: _Layout, columns: set[str], faults: list[str], on_progress: OnProgress
+) -> Iterator[Any]:
+    """Yield batches of rows with some columns; add the lines of a CSV file that have other numbers of cells."""
+    try:
+        if not layout.separator:
             with pq.ParquetFile(path, pre_buffer=False) as file:
-                _require(file.schema_arrow.names, columns, contents)
                 done = 0
                 for batch in file.iter_batches(_ROWS, columns=sorted(columns)):
                     done += batch.num_rows
                     on_progress(done / file.metadata.num_rows)
                     yield batch
             return
-        with path.open("rb") as head:
-            first = head.readline(1 << 20)
-        separator = max(",;\t", key=lambda letter: first.count(letter.encode()))
-        line = first.decode("utf-8-sig", "replace").rstrip("\r\n")
-        names = next(csv.reader([line], delimiter=separator), [])
-        _require(names, columns, contents)
-        types = {column: pa.string() if column in texts else pa.float64() for column in columns}
+
+        def skip(row: Any) -> str:
+            faults.append(f"{row.text[:60]!r} with {row.actual_columns} cells, expected {row.expected_columns}")
+            return "skip"
+
         convert = pa.csv.ConvertOptions(
-            column_types=types, include_columns=sorted(columns), null_values=_MISSING, strings_can_be_null=True
-        )
+            column_types=dict.fromkeys(columns, pa.string()), include_columns=sorted(columns), null_values=_MISSING,
+            strings_can_be_null=True,
+        )  # fmt: skip
         total, done = max(1, path.stat().st_size), 0
-        read, parse = pa.csv.ReadOptions(block_size=_BLOCK), pa.csv.ParseOptions(delimiter=separator)
+        read = pa.csv.ReadOptions(
+            block_size=_BLOCK, column_names=layout.names, skip_rows=1, encoding=layout.encoding, use_threads=False
+        )
+        parse = pa.csv.ParseOptions(delimiter=layout.separator, invalid_row_handler=skip)
         with contextlib.closing(pa.csv.open_csv(path, read, parse, convert)) as reader:
             for batch in reader:
                 done += _BLOCK
                 on_progress(min(1.0, done / total))
                 yield batch
-    except (pa.ArrowException, OSError, UnicodeDecodeError, csv.Error) as error:
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise ImportLogError(f"cannot be read: {error}") from error
 
 
-def _require(names: list[str], columns: set[str], contents: LogContents) -> None:
+def _require(names: Sequence[str], columns: set[str], contents: LogContents) -> None:
     """Refuse a table that lacks columns; record the unused ones."""
     missing = sorted(columns - set(names))
     if missing:
@@ -97,26 +160,65 @@ def _require(names: list[str], columns: set[str], contents: LogContents) -> None
     contents.unread.update({name: 1 for name in names if name not in columns})
 
 
-def _numbers(batch: Any, column: str) -> Array:
+def _numbers(batch: Any, column: str, layout: _Layout, texts: Counter[str]) -> Array:
+    """Return the numbers of a column, NaN for texts, which are counted."""
     values = batch.column(batch.schema.get_field_index(column))
+    if pa.types.is_string(values.type) and layout.decimal == ",":
+        values = pc.replace_substring(values, ",", ".")
     try:
         numbers: Array = np.asarray(pc.fill_null(values.cast(pa.float64()), float("nan")))
     except pa.ArrowException as error:
-        raise ImportLogError(f"column {column!r} is {values.type}, expected numbers") from error
+        if not pa.types.is_string(values.type):
+            raise ImportLogError(f"column {column!r} is {values.type}, expected numbers") from error
+        cells = values.to_pandas().replace(_FLAGS)
+        parsed = pd.to_numeric(cells, errors="coerce").to_numpy(float)
+        known = np.asarray(pc.is_valid(values))
+        odd = np.flatnonzero(np.isnan(parsed) & known)
+        texts[column] += len(odd)
+        if len(odd) > _MAX_TEXTS * np.count_nonzero(known) and len(odd) > 2:
+            raise ImportLogError(
+                f"column {column!r} has {values[int(odd[0])].as_py()[:30]!r}, expected numbers"
+            ) from error
+        return parsed
     return numbers
 
 
-def _seconds(batch: Any, time: TimeColumn) -> Array:
+def _seconds(batch: Any, time: TimeColumn, layout: _Layout, texts: Counter[str]) -> Array:
     values = batch.column(batch.schema.get_field_index(time.column))
     if pa.types.is_timestamp(values.type) or time.unit == "iso8601":
-        try:
-            moments = values.cast(pa.timestamp("ns", tz="UTC" if pa.types.is_string(values.type) else None))
-        except pa.ArrowException:
-            try:
-                moments = values.cast(pa.timestamp("ns"))
-            except pa.ArrowException as error:
-                raise ImportLogError(f"column {time.column!r}: {error}, expected times of ISO 8601") from error
-        nanoseconds = pc.fill_null(moments.cast(pa.int64()).cast(pa.float64(), safe=False), float("nan"))
-        seconds: Array = np.asarray(nanoseconds) * 1e-9
+        if pa.types.is_timestamp(values.type):
+            moments = values.cast(pa.timestamp("ns")).to_pandas()
+        else:
+            moments = pd.to_datetime(pd.Series(values.to_pandas()), format="ISO8601", utc=True, errors="coerce")
+            odd = np.flatnonzero(moments.isna().to_numpy() & np.asarray(pc.is_valid(values)))
+            texts[time.column] += len(odd)
+            if len(odd) > _MAX_TEXTS * len(values):
+                raise ImportLogError(
+                    f"column {time.column!r} has {values[int(odd[0])].as_py()[:30]!r}, expected times of ISO 8601"
+                )
+        since = pd.to_datetime(moments, utc=True) - pd.Timestamp(0, tz="UTC")
+        seconds: Array = since.dt.total_seconds().to_numpy(float)
         return seconds
-    return _numbers(batch, time.column) * UNITS["s"][time.unit]
+    return _numbers(batch, time.column, layout, texts) * UNITS["s"][time.unit]
+
+
+def _remark_texts(texts: Counter[str], rows: int, lines: Sequence[str], contents: LogContents) -> None:
+    """Remark cells and lines that are left out; raise ImportLogError if no line is left."""
+    if lines and not rows:
+        raise ImportLogError(f"has no line with a cell for each column: {lines[0]}")
+    if lines:
+        contents.remarks.append(f"{len(lines)} lines were left out, such as {lines[0]}.")
+    if worst := max(texts.values(), default=0):
+        names = ", ".join(f"{name!r}" for name in sorted(texts) if texts[name] == worst)
+        contents.remarks.append(f"{worst} lines with texts in place of numbers were left out: in {names[:80]}.")
+
+
+def _rates(path: Path, layout: _Layout) -> dict[str, dict[str, float]]:
+    """Return the columns of a table with numbers, each with its rate of new values per row, as a topic without name."""
+    table = next(_batches(path, layout, {*layout.names}, [], lambda fraction: None), None)
+    rates = {}
+    for name in layout.names if table is not None else ():
+        with contextlib.suppress(ImportLogError):
+            values = _numbers(table, name, layout, Counter())
+            rates[name] = float(np.mean(np.diff(values) != 0.0)) if len(values) > 1 else 0.0
+    return {"": rates}
