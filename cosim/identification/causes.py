@@ -11,7 +11,7 @@ import numpy as np
 from cosim.errors import IdentificationError
 from cosim.identification.log import Log
 from cosim.identification.parameters import NUISANCES, RANDOM_FORCE, free_parameters, nuisances
-from cosim.identification.residuals import Residuals
+from cosim.identification.residuals import Residuals, normal_equations
 from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
 
@@ -38,7 +38,8 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
     problem = Residuals(logs, vehicle, every, fitted.windows, step, has_force)
     problem.force_deviation = fitted.force_deviation
     try:
-        information, score, squares, rows = _normal_equations(problem, fitted, extended)
+        problem.weigh_as(fitted)
+        information, score, squares, rows = normal_equations(problem, extended)
     except IdentificationError:
         return []
     excess, free, causes = squares - rows, list(range(len(values))), []
@@ -48,7 +49,8 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
     if not has_force:
         forced = Residuals(logs, vehicle, parameters, fitted.windows, step, random_force=True)
         with contextlib.suppress(IdentificationError):  # then a force explains nothing
-            own_information, own_score, own_squares, _ = _normal_equations(forced, fitted, values)
+            forced.weigh_as(fitted)
+            own_information, own_score, own_squares, _ = normal_equations(forced, values)
             left = own_squares - _explained(own_information, own_score, free)
             causes.append(Cause(f"--nuisance {RANDOM_FORCE}", (squares - explained - left) / excess))
     count = len(values)
@@ -62,15 +64,3 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
 def _explained(information: Array, score: Array, free: list[int]) -> float:
     """Return the sum of squares that one Gauss-Newton step of the free parameters explains."""
     return float(score[free] @ np.linalg.solve(information[np.ix_(free, free)], score[free]))
-
-
-def _normal_equations(problem: Residuals, fitted: Residuals, values: Array) -> tuple[Array, Array, float, int]:
-    """Return information, score, sum of squares and number of residuals, weighed as the fitted ones."""
-    problem.weigh_as(fitted)
-    settings = problem.settings(values)
-    reduced = [problem.reduced(i, settings, values) for i in range(len(problem.windows))]
-    deviation, start = (np.array([getattr(p, name) for p in problem.parameters]) for name in ("deviation", "start"))
-    information = np.diag(deviation**-2.0) + sum(r.jacobian.T @ r.jacobian for r in reduced)
-    score = (values - start) / deviation**2 + sum(r.jacobian.T @ r.residual for r in reduced)
-    squares = sum(float(r.residual @ r.residual) for r in reduced)
-    return information, score, squares, sum(len(r.residual) for r in reduced)

@@ -24,6 +24,7 @@ from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
 
 MAX_STEP, MIN_STEP = 0.03, 0.015  # s, bounds of the integration step
+_MAX_TRANSLATION_STEP = 0.04  # s, where attitude and angular velocity are inputs: what is left is slow
 STAGES = (4.0, 20.0)  # s, lengths of windows: short ones converge from distant starts, long ones separate the numbers
 # relative decrease of the cost that ends a round: the first round, the others, the last one of a stage
 _HELD, _ROUGH, _PRECISION = 0.1, 1e-2, 1e-6
@@ -52,6 +53,9 @@ class Fit:
     causes: tuple[Cause, ...] = ()  # causes of a poor fit, the greatest first
     command_error: float | None = None  # errors of sampled commands, relative to those of steps at random times
     forces: Array | None = None  # (windows, 3) N, NED, random force of each window, if it is estimated
+    logs: tuple[Log, ...] = ()  # runs, with times of samples that are corrected by `delays`
+    weights: tuple[Array, ...] = ()  # of the rows of each window
+    turns_measured: bool = False  # True if attitude and angular velocity were inputs
 
     def vehicle_indices(self) -> list[int]:
         """Return the indices of the vehicle's own parameters."""
@@ -96,9 +100,10 @@ def single_thread() -> Iterator[None]:
 def fit(
     logs: Sequence[Log], vehicle: Vehicle, parameters: Sequence[Parameter],
     progress: Callable[[float], None] = lambda fraction: None, random_force: bool = False,
+    turns_measured: bool = False,
 ) -> Fit:  # fmt: skip
     """Fit the free parameters so that windows of runs are predicted best."""
-    step = integration_step(logs)
+    step = integration_step(logs, MAX_STEP if not turns_measured else _MAX_TRANSLATION_STEP)
     delays = find_delays(logs, vehicle, step)
     values, margins = _inside_bounds(parameters), (0.0, 0.0)
     if any(p.kind == "delay" for p in parameters):
@@ -108,7 +113,9 @@ def fit(
         is_delay = np.array([p.kind == "delay" for p in parameters])
         values = np.where(is_delay, [delays.get(p.plant, 0.0) for p in parameters], values)
     stages = tuple(zip(STAGES, _ROUNDS, strict=True))
-    if random_force or any(log.sampled for log in logs):  # noise covers the additional information of long windows
+    if (
+        turns_measured or random_force or any(log.sampled for log in logs)
+    ):  # noise covers the additional information of long windows
         stages = ((STAGES[0], _ROUNDS[0] + 1),)
     total, evaluations, finished = _MAX_EVALUATIONS * sum(rounds for _, rounds in stages), 0, 0
 
@@ -122,7 +129,7 @@ def fit(
         windows, rejected = cut_windows(logs, vehicle, step, length, margins)
         if not windows:
             raise IdentificationError(_no_window(rejected))
-        problem = Problem(Residuals(logs, vehicle, parameters, windows, step, random_force))
+        problem = Problem(Residuals(logs, vehicle, parameters, windows, step, random_force, turns_measured))
         residuals = problem.residuals
         for k in range(rounds):
             is_last, evaluations = k == rounds - 1, 0
@@ -143,8 +150,10 @@ def fit(
                 if not residuals.holds_starts:
                     residuals.update_force_deviation()
                     residuals.update_command_errors(values)
-        result = _result(problem, values, rejected, step, delays)
-        if result.intervals.chi2 > DISAGREES:
+        result = replace(
+            _result(problem, values, rejected, step, delays), logs=tuple(logs), turns_measured=turns_measured
+        )
+        if result.intervals.chi2 > DISAGREES and not turns_measured:
             result = replace(result, causes=tuple(find_causes(logs, vehicle, residuals, values, step)))
         fits.append(result)
     progress(1.0)
@@ -162,6 +171,7 @@ def _result(problem: Problem, values: Array, rejected: Counter[str], step: float
         parameters, values, intervals, tuple(windows), rejected, tuple(reduced),
         sum(int((np.abs(r) > _OUTLIER).sum()) for r in plain), sum(map(len, plain)), step, delays,
         command_error=problem.residuals.command_error, forces=problem.residuals.forces() if forced else None,
+        weights=tuple(problem.residuals.weights),
     )  # fmt: skip
 
 
@@ -226,13 +236,13 @@ class Problem:
         return self._known[1], self._known[2]
 
 
-def integration_step(logs: Sequence[Log]) -> float:
-    """Return an integration step that fits the usual time between changes of the commands, 15 to 30 ms [s]."""
+def integration_step(logs: Sequence[Log], longest: float = MAX_STEP) -> float:
+    """Return an integration step that fits the usual time between changes of the commands, 15 ms to `longest` [s]."""
     spans = np.concatenate([command_spans(log) for log in logs])
     usual = float(np.median(spans)) if len(spans) else MAX_STEP
-    if usual >= MIN_STEP:
-        return usual / math.ceil(usual / MAX_STEP - 1e-6)
-    return usual * math.ceil(MIN_STEP / usual - 1e-6)
+    if usual >= longest:
+        return usual / math.ceil(usual / longest - 1e-6)
+    return usual * (math.ceil(MIN_STEP / usual - 1e-6) if longest == MAX_STEP else int(longest / usual + 1e-6))
 
 
 def _inside_bounds(parameters: Sequence[Parameter]) -> Array:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import UnivariateSpline
 
 from cosim.errors import IdentificationError
 from cosim.results.log_facts import ATTITUDE_TIME, COMMAND_TIME, IMPORT, TopicFacts, load_log_facts
@@ -39,7 +40,9 @@ _COLUMNS: dict[str, tuple[tuple[str, str, str], ...]] = {
     "velocity": (("measured.velocity.", "uvw", "measured.time.dvl"), ("sensed.", "uvw", ""), ("velocity.", "uvw", "")),
     "angular_velocity": (("measured.angular_velocity.", "pqr", "measured.time.imu"), ("velocity.", "pqr", "")),
     "depth": (("measured.depth", "", "measured.time.depth_sensor"), ("position.", "z", "")),
-    "attitude": (("measured.attitude.e", "0123", ATTITUDE_TIME), ("sensed.e", "0123", ""), ("quaternion.e", "0123", "")),
+    "attitude": (
+        ("measured.attitude.e", "0123", ATTITUDE_TIME), ("sensed.e", "0123", ""), ("quaternion.e", "0123", ""),
+    ),
     "position": (
         ("measured.position.", "xyz", "measured.time.usbl"), ("sensed.", "xyz", ""), ("position.", "xyz", ""),
     ),
@@ -91,11 +94,7 @@ def make_topic(name: str, times: Array, values: Array, noise: float | None = Non
         values = _continuous(values)
     # twice the vector part of a quaternion, since its noise is that of small angles
     components = values if name != "attitude" else 2.0 * values[:, 1:]
-    if noise is None:
-        rough = np.abs(np.stack([np.convolve(x, _DIFFERENCE, "valid") for x in components.T], axis=1))
-        deviations = _MAD * np.median(rough, axis=0) / np.sqrt(np.square(_DIFFERENCE).sum())
-    else:
-        deviations = np.full(components.shape[1], float(noise))
+    deviations = _noise_of(components) if noise is None else np.full(components.shape[1], float(noise))
     period, spread = float(np.median(np.diff(times))), 0.0
     block = max(1, round((1.0 / _MAX_RATE) / period))
     if block > 1:
@@ -107,6 +106,13 @@ def make_topic(name: str, times: Array, values: Array, noise: float | None = Non
     if name == "attitude":
         values = values / np.linalg.norm(values, axis=1, keepdims=True)
     return Topic(name, times, values, np.maximum(deviations, _MIN_NOISE[name] if noise is None else 0.0), spread=spread)
+
+
+def _noise_of(values: Array) -> Array:
+    """Return the standard deviation of white noise in each column, from its fourth differences."""
+    rough = np.abs(np.stack([np.convolve(x, _DIFFERENCE, "valid") for x in values.T], axis=1))
+    deviations: Array = _MAD * np.median(rough, axis=0) / np.sqrt(np.square(_DIFFERENCE).sum())
+    return deviations
 
 
 def command_spans(log: Log) -> Array:
@@ -143,6 +149,33 @@ def load_log(folder: Path, vehicle: Vehicle) -> Log:
         time = record[COMMAND_TIME]
         known &= np.isfinite(time) & (np.diff(np.maximum.accumulate(np.nan_to_num(time)), prepend=-np.inf) > 0.0)
     return Log(folder.name, time[known], commands[known, :n], commands[known, n:], topics, sampled)
+
+
+def measured_turns(log: Log, times: Array) -> Array:
+    """Return quaternion and angular velocity [rad/s] at times [s], shape (n, 7), as an AHRS has measured them."""
+    attitude, rates = log.topic("attitude"), log.topic("angular_velocity")
+    if attitude is None:
+        raise IdentificationError(f"{log.name}: has no attitude, expected it as an input")
+    noise = _noise_of(attitude.values)
+    splines = [
+        UnivariateSpline(attitude.times, x, s=len(x) * d**2) for x, d in zip(attitude.values.T, noise, strict=True)
+    ]
+    inside = np.clip(times, attitude.times[0], attitude.times[-1])
+    values, slopes = (np.column_stack([f(inside) for f in fs]) for fs in (splines, [f.derivative() for f in splines]))
+    length = np.linalg.norm(values, axis=1, keepdims=True)
+    quaternions = values / length
+    omega = 2.0 * np.einsum("nij,nj->ni", half_turns(quaternions), slopes / length)
+    if rates is not None:
+        omega = np.column_stack([np.interp(times, rates.times, x) for x in rates.values.T])
+    return np.hstack([quaternions, omega])
+
+
+def half_turns(quaternions: Array) -> Array:
+    """Return matrices (..., 3, 4) from r to the vector part of conj(q) r; their rows are q times the unit vectors."""
+    # Twice that vector part is the rotation from q to r [rad, body frame], if it is small.
+    e0, e1, e2, e3 = np.moveaxis(quaternions, -1, 0)
+    rows = ((-e1, e0, e3, -e2), (-e2, -e3, e0, e1), (-e3, e2, -e1, e0))
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def _with_mean(topic: Topic, facts: Sequence[TopicFacts]) -> Topic:

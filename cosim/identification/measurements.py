@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.identification.log import STATES, Topic
+from cosim.identification.log import STATES, Topic, half_turns
 from cosim.simulation.signals import Array
 
 _LINEAR, _ANGULAR = STATES["velocity"], STATES["angular_velocity"]
@@ -64,14 +64,6 @@ def derivative_by_errors(topic: Topic, states: Array, errors: Errors, kind: str,
         return None
     result: Array = change / topic.noise
     return result
-
-
-def half_turns(quaternions: Array) -> Array:
-    """Return matrices (..., 3, 4) from r to the vector part of conj(q) r; their rows are q times the unit vectors."""
-    # Twice that vector part is the rotation from q to r [rad, body frame], if it is small.
-    e0, e1, e2, e3 = np.moveaxis(quaternions, -1, 0)
-    rows = ((-e1, e0, e3, -e2), (-e2, -e3, e0, e1), (-e3, e2, -e1, e0))
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def _sign(topic: Topic, states: Array) -> Array:

@@ -17,14 +17,16 @@ from cosim.identification.measurements import Errors
 from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
 
-Kind = Literal["plant", "lag", "thrust", "current", "force", "delay", "lever", "bias", "scale", "asymmetry", "phase"]
+Kind = Literal[
+    "plant", "lag", "thrust", "current", "force", "delay", "lever", "bias", "scale", "asymmetry", "phase", "trim"
+]
 
 # what is freed unless the user says otherwise: mass, weight, center of gravity and inertia are known better by scales
 DEFAULT_FREE = (
     "hydrodynamics.added_mass", "hydrodynamics.linear_damping", "hydrodynamics.quadratic_damping",
     "hydrostatics.buoyancy", "hydrostatics.center_of_buoyancy", "thrusters.time_constant",
 )  # fmt: skip
-NUISANCES: tuple[Kind, ...] = ("current", "force", "delay", "lever", "bias", "scale", "asymmetry", "phase")
+NUISANCES: tuple[Kind, ...] = ("current", "force", "delay", "lever", "bias", "scale", "asymmetry", "phase", "trim")
 RANDOM_FORCE = "random_force"  # a nuisance that is eliminated from each window, and no parameter
 DEFAULT_NUISANCES = ("current", "lever", "bias", "scale", "phase")
 
@@ -52,6 +54,7 @@ _NUISANCES: dict[str, tuple[str, str, float, str]] = {  # label, unit, deviation
     "scale": ("DVL scale error", "", 0.01, " "),
     "asymmetry": ("loss backward of thruster", "", 0.1, ""),
     "phase": ("changes between samples:", "", 1.0, ""),
+    "trim": ("trim", "N", 3.0, "XYZKMN"),
 }
 _CHANGE_PRIORS = {  # unit and deviation of the prior: those of a step at a time uniform in a period
     "lateness": ("periods", 0.29), "spread": ("periods2", 0.037), "smoothness": ("periods2/12", 1.0),
@@ -115,6 +118,8 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
             for index, axis in enumerate(components.get(name, list(axes))):
                 if name == "phase":
                     unit, deviation = _CHANGE_PRIORS[axis.split(" ")[0]]
+                if name == "trim" and axis in "KMN":
+                    unit, deviation = "N m", 0.5
                 plant = f"current.{axis}" if name == "current" else axis if name == "delay" else ""
                 full_name = f"{label} {axis}".strip() + suffix
                 parameters.append(Parameter(full_name, unit, name, 0.0, deviation, plant=plant, index=index, run=run))
@@ -159,7 +164,7 @@ def setting_of(
     n, plant, delays = forces.thrusters, dict[str, float](), dict[str, float]()
     vectors = {
         "thrust": np.ones(n), "asymmetry": np.zeros(n), "phase": np.zeros(len(CHANGES)), "force": np.zeros(3),
-        "lever": np.zeros(3), "bias": np.zeros(3), "scale": np.zeros(1),
+        "trim": np.zeros(6), "lever": np.zeros(3), "bias": np.zeros(3), "scale": np.zeros(1),
     }  # fmt: skip
     for p, x in zip(parameters, values, strict=True):
         if p.run not in (None, run):
@@ -174,6 +179,7 @@ def setting_of(
             case kind:
                 vectors[kind][p.index] = x
     actuation = forces.actuation(lag, vectors["thrust"], vectors["asymmetry"], vectors["phase"])
+    actuation.wrench[:, 0] += vectors["trim"]
     errors = Errors(vectors["lever"], float(vectors["scale"][0]), vectors["bias"])
     return Setting(plant, actuation, vectors["force"], errors, delays)
 

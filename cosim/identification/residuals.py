@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,7 @@ from cosim.errors import IdentificationError
 from cosim.identification import measurements
 from cosim.identification.actuation import CommandedForces, error_wrenches
 from cosim.identification.command_errors import Whitener, most_likely_errors, whitener
-from cosim.identification.log import Log, Topic
-from cosim.identification.measurements import half_turns
+from cosim.identification.log import Log, Topic, half_turns, measured_turns
 from cosim.identification.parameters import Parameter, Setting, setting_of
 from cosim.identification.shooting import STATE_SIZE, Directions, Motion, Shooter
 from cosim.identification.windows import Window
@@ -25,6 +24,7 @@ from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
 
 _START_DEVIATIONS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0)  # m, rad, m/s, rad/s
+_TURNS = ("attitude", "angular_velocity")  # topics that may be inputs
 _FORCES = range(12, 15)  # indices of a window's force behind those of its state
 _FORCE = 0.5  # N, standard deviation of a random force before any residual is known
 _MIN_FORCE = 0.01  # N
@@ -61,7 +61,11 @@ class Residuals:
         windows: Sequence[Window],
         step: float,
         random_force: bool = False,
+        turns_measured: bool = False,
     ) -> None:
+        if turns_measured:  # then they are inputs, and no measurements to explain
+            kept = ((w, tuple(t for t in w.topics if t.name not in _TURNS)) for w in windows)
+            windows = [replace(w, topics=topics) for w, topics in kept]
         self.parameters, self.windows = tuple(parameters), tuple(windows)
         self._shooter, self._step = Shooter(vehicle), step
         self._lag = float(vehicle.thrust_time_constant.mean())
@@ -69,7 +73,13 @@ class Residuals:
         has_position = any(topic.name == "position" for log in logs for topic in log.topics)
         has_depth = has_position or any(topic.name == "depth" for log in logs for topic in log.topics)
         # coordinates of a start that are solved for: of its state, and of its force behind them
-        known = [*((0, 1) if has_position else ()), *((2,) if has_depth else ()), *range(3, 12)]
+        known = [*((0, 1) if has_position else ()), *((2,) if has_depth else ())]
+        known += range(6, 9) if turns_measured else range(3, 12)
+        # quaternion and angular velocity at the ends of each run's steps, where they are inputs
+        self._turns = [
+            measured_turns(log, forces.start + step * np.arange(forces.steps + 1)) if turns_measured else None
+            for log, forces in zip(logs, self._forces, strict=True)
+        ]
         self._starts = [*known, *(_FORCES if random_force else ())]
         self.force_deviation = np.full(3, _FORCE) if random_force else None  # N, north, east, down
         # (12, starts) derivatives of the weak prior of a start
@@ -114,7 +124,7 @@ class Residuals:
     ) -> Iterator[tuple[Topic, Motion, Array]]:
         """Yield each topic of a window, the motion at its samples, and its residuals' derivatives along directions."""
         window = self.windows[i]
-        inside = slice(window.first, window.first + window.steps)
+        inside, turns = slice(window.first, window.first + window.steps), self._turns[window.run]
         times = [
             topic.times + topic.shift - setting.delays.get(topic.name, topic.shift) + off
             for topic in window.topics for off in topic.offsets
@@ -123,6 +133,7 @@ class Residuals:
         motion = self._shooter.predict(
             setting.plant, start[:13], setting.actuation.wrench[inside], self._step, np.concatenate(times)[order],
             directions, setting.force + (start[13:] if len(start) > 13 else 0.0),
+            None if turns is None else turns[window.first : window.first + window.steps + 1],
         )  # fmt: skip
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
@@ -185,7 +196,16 @@ class Residuals:
     @staticmethod
     def _moves(p: Parameter, run: int) -> bool:
         """Return True if a parameter changes the motion of a run, and not only its measurements."""
-        return p.run in (None, run) and p.kind in ("plant", "lag", "thrust", "asymmetry", "phase", "current", "force")
+        return p.run in (None, run) and p.kind in (
+            "plant",
+            "lag",
+            "thrust",
+            "asymmetry",
+            "phase",
+            "current",
+            "force",
+            "trim",
+        )
 
     def _directions(self, moving: Sequence[int], setting: Setting, inside: slice, start: Array) -> Directions:
         n, count = len(self._starts), len(self._starts) + len(moving)
@@ -200,6 +220,10 @@ class Residuals:
                 names[row] = p.plant
             elif p.kind == "force":
                 force[row, p.index] = 1.0
+            elif p.kind == "trim":
+                inputs[row] = len(wrenches)
+                wrenches.append(np.zeros((inside.stop - inside.start, 2, 6)))
+                wrenches[-1][:, 0, p.index] = 1.0
             else:
                 inputs[row] = len(wrenches)
                 actuation = setting.actuation
@@ -322,3 +346,14 @@ class Residuals:
         moved: Array = state + (step @ self._basis(state))[: len(state)]
         moved[3:7] /= np.linalg.norm(moved[3:7])
         return moved
+
+
+def normal_equations(problem: Residuals, values: Array) -> tuple[Array, Array, float, int]:
+    """Return information, score, sum of squares and number of residuals, with the priors in the first two."""
+    settings = problem.settings(values)
+    reduced = [problem.reduced(i, settings, values) for i in range(len(problem.windows))]
+    deviation, start = (np.array([getattr(p, name) for p in problem.parameters]) for name in ("deviation", "start"))
+    information = np.diag(deviation**-2.0) + sum(r.jacobian.T @ r.jacobian for r in reduced)
+    score = (values - start) / deviation**2 + sum(r.jacobian.T @ r.residual for r in reduced)
+    squares = sum(float(r.residual @ r.residual) for r in reduced)
+    return information, score, squares, sum(len(r.residual) for r in reduced)

@@ -44,8 +44,8 @@ class _Request(ctypes.Structure):
         ("step", ctypes.c_double),
         *((name, ctypes.c_void_p) for name in (
             "references", "values", "start", "wrench", "force", "start_tangents", "parameter_directions",
-            "input_directions", "force_tangents", "wrench_tangents", "times", "states", "rates", "state_tangents",
-            "work",
+            "input_directions", "force_tangents", "wrench_tangents", "turns", "times", "states", "rates",
+            "state_tangents", "work",
         )),
     )  # fmt: skip
 
@@ -87,9 +87,11 @@ class Shooter:
         times: Array,
         directions: Directions | None = None,
         force: Array | None = None,
+        turns: Array | None = None,
     ) -> Motion:
         """Predict the motion under a wrench that is linear over each step; start [m, NED]."""
-        # Units of arguments: wrench [N, N m, body frame]; step [s]; times [s]; force [N, NED]
+        # Units of arguments: wrench [N, N m, body frame], step [s], times [s], force [N, NED], turns (steps + 1, 7): quaternion and
+        # angular velocity [rad/s] at the ends of the steps, which then are not predicted
         along = directions or NO_DIRECTIONS
         d, n = len(along.parameters), len(times)
         references = [self._references[name] for name in parameters]
@@ -106,6 +108,7 @@ class Shooter:
             "input_directions": np.array([-1 if i is None else i for i in along.inputs], np.intc),
             "force_tangents": np.ascontiguousarray(along.force, float),
             "wrench_tangents": np.ascontiguousarray(along.wrench, float).reshape(*along.wrench.shape[:2], 2, 6),
+            "turns": np.empty(0) if turns is None else np.ascontiguousarray(turns, float),
             "times": np.ascontiguousarray(times, float),
             "states": motion.states,
             "rates": motion.rates,
@@ -114,7 +117,7 @@ class Shooter:
         }
         request = _Request(len(references), len(wrench), d, len(along.wrench), n, step)
         for name, array in arrays.items():
-            setattr(request, name, array.ctypes.data)
+            setattr(request, name, array.ctypes.data if name != "turns" or turns is not None else None)
         message = self._predict(ctypes.byref(request))
         if message:
             raise IdentificationError(f"prediction: {message.decode()}")

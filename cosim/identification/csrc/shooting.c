@@ -17,7 +17,40 @@ typedef struct {
     Model model, seed;
     const Prediction *asked;
     double *tangent, *stage, *slopes[4]; /* (n_directions, 13) each */
+    double share[3][3]; /* linear acceleration that a moment causes, by the angular one; with given turns alone */
 } Shooter;
+
+/* Writes the linear acceleration by each angular one, of forces that are zero: M^-1 (1:3, 4:6) times the inverse of M^-1 (4:6, 4:6). */
+static void find_share(Shooter *s)
+{
+    const double(*inverse)[6] = (const double(*)[6])s->model.plant.derived.mass_inverse;
+    double a[3][3], minors[3][3], det;
+
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            a[i][j] = inverse[3 + i][3 + j];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            minors[j][i] = a[(i + 1) % 3][(j + 1) % 3] * a[(i + 2) % 3][(j + 2) % 3] -
+                           a[(i + 1) % 3][(j + 2) % 3] * a[(i + 2) % 3][(j + 1) % 3];
+    det = a[0][0] * minors[0][0] + a[0][1] * minors[1][0] + a[0][2] * minors[2][0];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            s->share[i][j] = 0.0;
+            for (int k = 0; k < 3; k++)
+                s->share[i][j] += inverse[i][3 + k] * minors[k][j] / det;
+        }
+}
+
+/* Replaces the turning in a rate by a given one, and takes what the moments contribute to the linear accelerations out. */
+static void constrain(const Shooter *s, const double turning[7], double rate[N_RIGID])
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            rate[7 + i] -= s->share[i][j] * (rate[10 + j] - turning[4 + j]);
+    memcpy(rate + 3, turning, 4 * sizeof(double));
+    memcpy(rate + 10, turning + 4, 3 * sizeof(double));
+}
 
 /* Writes the tangent of the rate along a change of the state, of a parameter (NULL: none), and of the wrench. */
 static void differentiate(Shooter *s, const double rate[N_RIGID], const double R[3][3], const double rigid[N_RIGID],
@@ -104,6 +137,8 @@ static void evaluate(Shooter *s, int k, double part, const double *along, double
     const double *wrench = asked->wrench + 12 * (size_t)k, off = part - 0.5;
     double R[3][3], tau[6], pushed[3], nu_r[6], nu_r_rate[6];
     Row by_state[N_RIGID];
+    static const double fixed[7] = {0.0};
+    double turning[7];
 
     plant_rotation(s->model.state.rigid + 3, R);
     for (int i = 0; i < 6; i++)
@@ -112,6 +147,11 @@ static void evaluate(Shooter *s, int k, double part, const double *along, double
     for (int i = 0; i < 3; i++)
         tau[i] += pushed[i];
     plant_derivative(&s->model.plant, &s->model.held.drift, s->model.time, s->model.state.rigid, tau, rate);
+    if (asked->turns) {
+        for (int i = 0; i < 7; i++)
+            turning[i] = (asked->turns[7 * (size_t)(k + 1) + i] - asked->turns[7 * (size_t)k + i]) / asked->step;
+        constrain(s, turning, rate);
+    }
     if (!asked->n_directions)
         return;
 
@@ -119,7 +159,8 @@ static void evaluate(Shooter *s, int k, double part, const double *along, double
     for (int i = 2; i < N_RIGID; i++) {
         double unit[N_RIGID] = {0.0}, column[sizeof(Row) / sizeof(double)] = {0.0};
         unit[i] = 1.0;
-        differentiate(s, rate, (const double(*)[3])R, unit, NULL, still, column);
+        if (!asked->turns || i == 2 || (i >= 7 && i < 10)) /* given turns have no tangents */
+            differentiate(s, rate, (const double(*)[3])R, unit, NULL, still, column);
         memcpy(&by_state[i], column, sizeof by_state[i]);
     }
     relative_to_water(s, rate, (const double(*)[3])R, nu_r, nu_r_rate);
@@ -147,6 +188,8 @@ static void evaluate(Shooter *s, int k, double part, const double *along, double
             sum += tangent[i] * by_state[i];
         for (int n = 0; n < N_RIGID; n++)
             moved[n] += sum[n];
+        if (asked->turns)
+            constrain(s, fixed, moved);
     }
 }
 
@@ -253,12 +296,18 @@ const char *shooting_predict(const Prediction *asked)
     const char *wrong = plant_prepare(&s.model.plant);
     if (wrong)
         return wrong;
+    find_share(&s);
     memcpy(s.model.state.rigid, asked->start, sizeof s.model.state.rigid);
     memcpy(s.tangent, asked->start_tangents, size * sizeof(double));
     if (!is_a_motion(s.model.state.rigid) || !normalize(&s))
         return LOST;
-    for (int k = 0, next = 0; k < asked->n_steps; k++)
+    for (int k = 0, next = 0; k < asked->n_steps; k++) {
+        if (asked->turns) {
+            memcpy(s.model.state.rigid + 3, asked->turns + 7 * (size_t)k, 4 * sizeof(double));
+            memcpy(s.model.state.rigid + 10, asked->turns + 7 * (size_t)k + 4, 3 * sizeof(double));
+        }
         if (!advance(&s, k, &next))
             return LOST;
+    }
     return NULL;
 }

@@ -28,6 +28,7 @@ typedef struct { /* one prediction; arrays are row by row */
     const int *input_directions;    /* (n_directions,) row of wrench_tangents; -1: none */
     const double *force_tangents;   /* (n_directions, 3) */
     const double *wrench_tangents;  /* (n_inputs, n_steps, 2, 6) */
+    const double *turns;            /* (n_steps + 1, 7) quaternion and angular velocity at the steps' ends, or NULL: computed */
     const double *times;            /* (n_samples,) s since the start, rising */
 
     double *states;         /* (n_samples, 13) */
