@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from plant_fmu.autopilot import Autopilot
 from plant_fmu.errors import TableError, VehicleError
+from plant_fmu.size_estimates import complete_tables
 from plant_fmu.toml_tables import Table, decode, key, read_toml, require
 
 MAX_NUMBER = 1e15  # bound of every number of a vehicle, so that derived numbers are finite
@@ -100,6 +101,7 @@ class Hull(Table, frozen=True):
     """The sphere about the body origin that meets surface and bottom, and the shape in pictures."""
 
     radius: Amount = 0.0  # m
+    size: tuple[Amount, Amount, Amount] | None = None  # m: length, width, height; estimates what the file lacks
     shape: Literal["frame", "sphere"] = "frame"  # shape in pictures; the dynamics do not depend on it
 
 
@@ -219,7 +221,7 @@ def _shipped(name: str) -> Vehicle:
 
 def _decode(path: Path, where: str) -> Vehicle:
     try:
-        return _make_vehicle(decode(read_toml(path), _File))
+        return _make_vehicle(decode(complete_tables(read_toml(path)), _File))
     except (TableError, ValueError) as error:
         raise VehicleError(f"{where}: {error}") from error
 

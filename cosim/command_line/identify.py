@@ -38,8 +38,10 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     flag(
         verb, "--nuisance NAME", "nuisance parameters: current, force, delay, lever, bias, scale, asymmetry, phase, "
-        "random_force (default: current, lever, bias, scale and phase)", nargs="*",
+        "random_force, trim (default: current, lever, bias, scale and phase); or auto: those that predict best what "
+        "was not fitted, with measured attitude", nargs="*",
     )  # fmt: skip
+    flag(verb, "--measured-attitude", "take attitude and turn rates as inputs, and identify translation alone")
     flag(verb, "--held-out RUN", "run folders that are predicted, not fitted", Path, [], nargs="+")
     flag(
         verb, "--out PATH", "the vehicle's TOML file, beside which its page and FILE.posterior.jsonl are written; with "
@@ -57,46 +59,64 @@ def add_verbs(verbs: Any) -> None:
 
 def identify(options: argparse.Namespace) -> int:
     """Run ``cosim identify``."""
-    from cosim.identification.parameters import DEFAULT_FREE, DEFAULT_NUISANCES
+    from cosim.identification.parameters import DEFAULT_NUISANCES
     from cosim.run.progress import ProgressBar
 
-    fitted = DEFAULT_FREE if options.free is None else options.free
     nuisance = DEFAULT_NUISANCES if options.nuisance is None else options.nuisance
     work, what = (_excite, "excite") if options.excite else (_fit, "identify")
     bar_format = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}]"
     with ProgressBar(not options.quiet, bar_format, total=1.0, desc=what) as bar:
-        lines = work(options, fitted, nuisance, bar.update_to)
+        lines = work(options, options.free, nuisance, bar.update_to)
     say(options, *lines)
     print(options.out)
     return 0
 
 
 def _fit(
-    options: argparse.Namespace, free: Sequence[str], nuisance: Sequence[str], progress: Callable[[float], None]
+    options: argparse.Namespace, free: Sequence[str] | None, nuisance: Sequence[str], progress: Callable[[float], None]
 ) -> list[str]:
     """Identify the vehicle and write it; return what to print."""
     from cosim.identification import findings
-    from cosim.identification.identification import identify, write_results
+    from cosim.identification.identification import identify, summary_lines, write_results
     from cosim.identification.vehicle_file import name_of_file
 
     refuse_flags(options, [*_EXCITATION], "--excite with it")
     name_of_file(options.out)  # so that hours of work do not end at it
-    done = identify(options.runs, options.vehicle, free, nuisance, options.held_out, progress)
+    done = identify(
+        options.runs, options.vehicle, free, nuisance, options.held_out, progress, options.measured_attitude
+    )
     posterior, page = write_results(done, options.out)
-    return [findings.verdict(done.fit), *findings.warnings(done.fit, done.logs), str(posterior), str(page)]
+    return [
+        findings.verdict(done.fit),
+        *summary_lines(done),
+        *findings.warnings(done.fit, done.logs),
+        str(posterior),
+        str(page),
+    ]
 
 
 def _excite(
-    options: argparse.Namespace, free: Sequence[str], nuisance: Sequence[str], progress: Callable[[float], None]
+    options: argparse.Namespace, free: Sequence[str] | None, nuisance: Sequence[str], progress: Callable[[float], None]
 ) -> list[str]:
     """Design the stick inputs and write their folder; return what to print."""
     from cosim.identification import excitation_page
     from cosim.identification.excitation import design
+    from cosim.identification.parameters import DEFAULT_FREE
 
-    refuse_flags(options, ["runs", "held_out"], "none with --excite")
+    refuse_flags(options, ["runs", "held_out", "measured_attitude"], "none with --excite")
     excitation_page.require_empty(options.out)
     given = {name: getattr(options, name) for name in _EXCITATION if getattr(options, name) is not None}
     box, depth, time, current, seed = (_EXCITATION | given).values()
-    done = design(options.vehicle, tuple(box), depth, time, free, nuisance, seed, progress, current)
+    done = design(
+        options.vehicle,
+        tuple(box),
+        depth,
+        time,
+        DEFAULT_FREE if free is None else free,
+        nuisance,
+        seed,
+        progress,
+        current,
+    )
     page = excitation_page.write_folder(done, options.out)
     return [excitation_page.verdict(done), *excitation_page.warnings(done), str(page)]

@@ -58,11 +58,16 @@ def move_back(log: Log, delays: dict[str, float]) -> Log:
     ))  # fmt: skip
 
 
+def delay_of(p: Parameter, delays: dict[str, float]) -> float:
+    """Return the delay [s] of the topics of a parameter."""
+    return max((delays[name] for name in p.topics if name in delays), default=0.0)
+
+
 def within_margins(p: Parameter, delays: dict[str, float]) -> Parameter:
     """Return a delay with bounds that keep samples in their windows; return other parameters unchanged."""
     if p.kind != "delay":
         return p
-    late = delays.get(p.plant, 0.0)
+    late = delay_of(p, delays)
     return replace(p, min=late - MARGINS[1], max=late + MARGINS[0])
 
 

@@ -15,6 +15,7 @@ from cosim.identification.parameters import NUISANCES, RANDOM_FORCE
 
 _USELESS = 10.0  # chi2 per degree of freedom, above which nothing was identified
 _MAX_CORRELATION = 0.95  # magnitude of the correlation, above which runs do not separate two numbers
+_MAX_SCALE = 0.05  # relative error of the DVL's scale, above which a warning names it
 _MAX_LISTED = 6  # names in a list
 MIN_CAUSE_FRACTION = 0.1  # fraction of the unexplained residuals, above which a cause is named
 _WEAK = 0.1  # ratio of nominal to prior deviation, above which a maneuver is advised
@@ -45,6 +46,15 @@ def verdict(fit: Fit) -> str:
     )
 
 
+def shared_nuisances(fit: Fit) -> Iterator[str]:
+    """Yield a sentence with the nuisances that all runs share, for which a vehicle's file has no keys."""
+    numbers = zip(fit.parameters, fit.values, fit.intervals.half, strict=True)
+    shared = [f"{p.name} {x:.3g} ± {half:.2g} {p.unit}".rstrip() for p, x, half in numbers
+              if p.is_nuisance and p.run is None and p.kind != "phase"]  # fmt: skip
+    if shared:
+        yield f"Estimated beside, and no part of this file: {'; '.join(shared)}."
+
+
 def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
     """Yield the warnings that a user must read before using the numbers."""
     if fit.intervals.chi2 > _USELESS:
@@ -60,7 +70,7 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
             f"{worst.replace('_', ' ')}: its residuals are {size:.1f} times its noise. The intervals are those of a "
             "jackknife, and hold as far as the pieces of the runs are alike."
         )
-    if fit.intervals.chi2 > DISAGREES:
+    if fit.intervals.chi2 > DISAGREES and not fit.turns_measured:
         yield _cause(fit, any(slow_commands(log) for log in logs))
     if fit.forces is not None:
         sizes = ", ".join(f"{x:.2g}" for x in np.sqrt(np.mean(np.square(fit.forces), axis=0)))
@@ -69,10 +79,16 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
             "north, east and down (root mean square). Its mean over the runs looks like weight less buoyancy or a "
             "current; longer runs make that smaller."
         )
-    elif fit.command_error is None and fit.windows[0].steps * fit.step < 0.5 * STAGES[-1]:
+    elif not fit.turns_measured and fit.command_error is None and fit.windows[0].steps * fit.step < 0.5 * STAGES[-1]:
         yield (
             f"Predictions over {STAGES[-1]:g} s fail, as they do where a motion is unstable without its control: the "
             f"numbers are those of windows of {STAGES[0]:g} s."
+        )
+    scale = [float(x) for p, x in zip(fit.parameters, fit.values, strict=True) if p.kind == "scale"]
+    if scale and abs(scale[0]) > _MAX_SCALE:
+        yield (
+            f"The DVL's velocities are {100 * scale[0]:+.0f} % off by the other sensors: check its speed of sound and "
+            "mounting before you use the numbers."
         )
     undetermined = [fit.parameters[i].name for i in fit.undetermined()]
     if undetermined:
@@ -99,7 +115,8 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
     if fit.outliers:
         yield f"{fit.outliers} of {fit.samples} measured components are outliers, and count by Huber's weights."
     yield from filter(None, map(slow_commands, logs))
-    missing = {"velocity", "angular_velocity", "depth"} - {topic.name for log in logs for topic in log.topics}
+    needed = {"velocity", "depth"} | (set() if fit.turns_measured else {"angular_velocity"})
+    missing = needed - {topic.name for log in logs for topic in log.topics}
     for name in sorted(missing):
         yield f"There are no samples of {name.replace('_', ' ')} in these runs."
 
@@ -163,6 +180,7 @@ _CAUSES = {
     "asymmetry": "thrusters that are weaker backward", "thrusters.matrix": "unequal thrusters",
     "thrusters.time_constant": "a lag of the thrusters", "current": "a current", "lever": "the DVL's lever arm",
     "bias": "biases of the gyro", "phase": "commands that change early or late between samples",
+    "trim": "a constant force on the body, as of trim or a mounted tether",
     "random_force": "a force that changes in time, such as of waves or a tether",
 }  # fmt: skip
 

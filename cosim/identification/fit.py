@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from cosim.errors import IdentificationError
 from cosim.identification.causes import Cause, find_causes
-from cosim.identification.delays import find_delays, move_back, within_margins
+from cosim.identification.delays import delay_of, find_delays, move_back, within_margins
 from cosim.identification.intervals import DISAGREES, MAX_PRIOR_FRACTION, Intervals, estimate_intervals
 from cosim.identification.log import Log, command_spans
 from cosim.identification.parameters import Parameter
@@ -100,18 +100,18 @@ def single_thread() -> Iterator[None]:
 def fit(
     logs: Sequence[Log], vehicle: Vehicle, parameters: Sequence[Parameter],
     progress: Callable[[float], None] = lambda fraction: None, random_force: bool = False,
-    turns_measured: bool = False,
+    turns_measured: bool = False, delays: dict[str, float] | None = None,
 ) -> Fit:  # fmt: skip
-    """Fit the free parameters so that windows of runs are predicted best."""
+    """Fit the free parameters so that windows of runs are predicted best; delays [s] by topic, where they are known."""
     step = integration_step(logs, MAX_STEP if not turns_measured else _MAX_TRANSLATION_STEP)
-    delays = find_delays(logs, vehicle, step)
+    delays = find_delays(logs, vehicle, step) if delays is None else delays
     values, margins = _inside_bounds(parameters), (0.0, 0.0)
     if any(p.kind == "delay" for p in parameters):
         margins = MARGINS
         logs = [move_back(log, delays) for log in logs]
         parameters = [within_margins(p, delays) for p in parameters]
         is_delay = np.array([p.kind == "delay" for p in parameters])
-        values = np.where(is_delay, [delays.get(p.plant, 0.0) for p in parameters], values)
+        values = np.where(is_delay, [delay_of(p, delays) for p in parameters], values)
     stages = tuple(zip(STAGES, _ROUNDS, strict=True))
     if (
         turns_measured or random_force or any(log.sampled for log in logs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,12 +16,14 @@ from cosim.identification.parameters import (
     DEFAULT_FREE,
     DEFAULT_NUISANCES,
     RANDOM_FORCE,
+    TRANSLATION_FREE,
     Parameter,
     free_parameters,
     nuisances,
     with_mean_nuisances,
 )
 from cosim.identification.prediction import Prediction, validate
+from cosim.identification.structure import AUTO, Structure, choose_structure
 from cosim.identification.vehicle_file import name_of_file, posterior_lines, vehicle_text
 from cosim.io.atomic_file import reason, write_together
 from cosim.report.web_page import render_page
@@ -37,27 +40,37 @@ class Identification:
     held_out: tuple[Log, ...]  # runs for validation, not fitted
     fit: Fit
     predictions: tuple[Prediction, ...]  # prediction errors of the runs held out, or without them of the fitted ones
+    command: str  # that reproduces this identification, without ``--out``
+    structure: Structure | None = None  # chosen structure, with the nuisances `AUTO`
 
 
 def identify(
     runs: Sequence[Path],
     start: str,
-    free: Sequence[str] = DEFAULT_FREE,
+    free: Sequence[str] | None = None,
     nuisance: Sequence[str] = DEFAULT_NUISANCES,
     held_out: Sequence[Path] = (),
     progress: Callable[[float], None] = lambda part: None,
+    turns_measured: bool = False,
 ) -> Identification:
     """Identify parameters of a vehicle from recorded runs."""
+    # `free`: default by the structure. `turns_measured`: attitude and angular velocity are inputs.
     if not runs:
         raise IdentificationError("no run is given, expected one at the least")
     vehicle = load_vehicle(start)
-    parameters = free_parameters(vehicle, free)
-    if not parameters:
-        raise IdentificationError("--free: nothing is free, expected one key at the least")
     logs, held_out_logs = (tuple(load_log(run, vehicle) for run in folders) for folders in (runs, held_out))
-    parameters += nuisances(nuisance, logs)
+    structure, delays = None, None
+    if [*nuisance] == [AUTO]:
+        turns_measured = True
+        structure = choose_structure(logs, vehicle, free)
+        vehicle, parameters, delays = structure.vehicle, list(structure.parameters), structure.delays
+    else:
+        parameters = free_parameters(vehicle, free or (TRANSLATION_FREE if turns_measured else DEFAULT_FREE))
+        if free is not None and not free:
+            raise IdentificationError("--free: nothing is free, expected one key at the least")
+        parameters += nuisances(nuisance, logs, common_delay=turns_measured)
     try:
-        fitted = fit(logs, vehicle, parameters, progress, RANDOM_FORCE in nuisance)
+        fitted = fit(logs, vehicle, parameters, progress, RANDOM_FORCE in nuisance, turns_measured, delays)
     except IdentificationError as error:
         delay_notes = [text for log in logs if (text := findings.slow_commands(log))]
         raise IdentificationError(". ".join([str(error), *([" ".join(delay_notes)] if delay_notes else [])])) from error
@@ -66,7 +79,25 @@ def identify(
         predictions = validate(held_out_logs, vehicle, *with_mean_nuisances(parameters, fitted.values), fitted.step)
     else:
         predictions = validate(logs, vehicle, parameters, fitted.values, fitted.step)
-    return Identification(start, vehicle, logs, held_out_logs, fitted, tuple(predictions))
+    flags = {
+        "": runs, "--vehicle": [start], "--held-out": held_out, "--free": free or (), "--nuisance": nuisance,
+        "--measured-attitude": [""] if turns_measured and structure is None else (),
+    }  # fmt: skip
+    words = (word for name, values in flags.items() if values for word in (name, *map(str, values)) if word)
+    command = f"cosim identify {shlex.join(words)}"
+    return Identification(start, vehicle, logs, held_out_logs, fitted, tuple(predictions), command, structure)
+
+
+def summary_lines(result: Identification) -> list[str]:
+    """Return the chosen structure and the quality of the predictions, in sentences."""
+    lines = [result.structure.summary()] if result.structure else []
+    shown = [p for p in result.predictions if p.topic == "velocity"]
+    of = "held-out" if result.held_out else "fitted"
+    for measured, how in ((True, "with measured attitude"), (False, "free-running")):
+        r2 = [f"{p.horizon:g} s: {', '.join(f'{x:.2f}' for x in p.r2)}" for p in shown if p.turns_measured == measured]
+        if r2:
+            lines.append(f"R² of surge, sway and heave velocity on {of} runs, {how}: {'; '.join(r2)}.")
+    return lines
 
 
 def vehicle_contents(result: Identification, out: Path) -> str:
@@ -76,6 +107,8 @@ def vehicle_contents(result: Identification, out: Path) -> str:
         f"Identified by cosim identify from {names}, starting from {result.vehicle.name}. Behind a number stands "
         "half of its 95 % interval.",
         findings.verdict(result.fit),
+        *summary_lines(result),
+        *findings.shared_nuisances(result.fit),
         *findings.warnings(result.fit, result.logs),
     ]
     return vehicle_text(result.start, result.vehicle, result.fit, name_of_file(out), provenance)
@@ -105,11 +138,12 @@ def page_contents(result: Identification, out: Path) -> str:
     fit, logs = result.fit, result.logs
     return render_page(
         "cosim.identification/identification.html.j2", vehicle=result.vehicle.title, out=out,
-        figures=inline_figures(figures_of(fit, result.predictions)), verdict=findings.verdict(fit),
-        warnings=findings.warnings(fit, logs), advice=findings.advice(fit), rows=list(_rows(result.fit, False)),
+        figures=inline_figures(figures_of(fit, result.vehicle, result.predictions)), verdict=findings.verdict(fit),
+        warnings=[*summary_lines(result), *findings.warnings(fit, logs)], advice=findings.advice(fit),
+        rows=list(_rows(result.fit, False)),
         nuisance_rows=list(_rows(result.fit, True)), clusters=fit.intervals.clusters, predictions=result.predictions,
         held_out=[log.name for log in result.held_out], units=UNITS, topics=findings.topic_rows(logs),
-        logs=[log.name for log in logs], start=result.start, free=fit.free_keys(),
+        command=f"{result.command} --out {shlex.quote(out.name)}",
     )  # fmt: skip
 
 

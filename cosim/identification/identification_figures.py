@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
@@ -15,9 +16,12 @@ from cosim.identification.log import AXES, UNITS
 from cosim.identification.prediction import Prediction
 from cosim.report.figures.style import BLACK, BLUE, ORANGE, SKY, STYLE, NamedFigure
 from cosim.report.web_page import InlineFigure, inline_figure
+from cosim.simulation.signals import Array
 from plant_fmu.archive import temporary_folder
+from plant_fmu.vehicle import Vehicle
 
 _WIDTH = 7.2  # in
+_MAX_LAG = 20  # samples between residuals whose correlation is shown
 _MAX_SHOWN = 60  # parameters in a figure
 
 
@@ -27,10 +31,11 @@ def inline_figures(drawings: Iterable[NamedFigure]) -> dict[str, InlineFigure]:
         return {drawing.name: inline_figure(drawing, scratch) for drawing in drawings}
 
 
-def figures_of(fit: Fit, predictions: Sequence[Prediction]) -> Iterator[NamedFigure]:
+def figures_of(fit: Fit, vehicle: Vehicle, predictions: Sequence[Prediction]) -> Iterator[NamedFigure]:
     """Yield all figures in their order."""
     yield NamedFigure("numbers", _NUMBERS, _numbers(fit))
     yield NamedFigure("residuals", _RESIDUALS, _residuals(fit))
+    yield NamedFigure("whiteness", _WHITENESS, _whiteness(fit, vehicle))
     if predictions:
         yield NamedFigure("predictions", _PREDICTIONS, _predictions(predictions))
     yield NamedFigure("correlation", _CORRELATION, _correlation(fit))
@@ -41,6 +46,11 @@ _NUMBERS = (
     "95 % interval. A bar that fills the gray band rests on its prior."
 )
 _RESIDUALS = "Residuals of the last stage by component, in standard deviations of the sensor's noise, over all windows."
+_WHITENESS = (
+    "Left: autocorrelation of the residuals of the velocity, or else of the first topic, by the number of samples "
+    "between them. Right: their correlation with the commanded force along the same axis, that much earlier. In the "
+    "gray band (95 %) they are like white noise: outside, a part of the model is missing."
+)
 _PREDICTIONS = (
     "Free-running prediction: root mean square error of the speed and the angular velocity along and about each axis, "
     "from starts that the samples give."
@@ -83,8 +93,40 @@ def _residuals(fit: Fit) -> Figure:
     return figure
 
 
+def _whiteness(fit: Fit, vehicle: Vehicle) -> Figure:
+    name = "velocity" if any(t.name == "velocity" for t in fit.windows[0].topics) else fit.windows[0].topics[0].name
+    rows, inputs = list[Array](), list[Array]()
+    for window, reduced in zip(fit.windows, fit.residuals, strict=True):
+        log = fit.logs[window.run]
+        topic = next(t for t in window.topics if t.name == name)
+        forces = log.thrust @ vehicle.thruster_matrix.T + log.wrench
+        times = topic.times + window.begin
+        held = forces[np.clip(np.searchsorted(log.times, times, "right") - 1, 0, len(forces) - 1)]
+        rows.append(window.by_topic(reduced.residual)[name])
+        inputs.append(held - held.mean(axis=0))
+    figure = Figure(figsize=(_WIDTH, 2.2), layout="constrained")
+    both = figure.subplots(1, 2, sharex=True, sharey=True)
+    band = 1.96 / np.sqrt(sum(map(len, rows)))
+    for axes, others, title in zip(both, (rows, inputs), ("residual", "commanded force"), strict=True):
+        axes.axhspan(-band, band, color=BLACK, alpha=0.08, linewidth=0)
+        for j, component in enumerate(AXES[name][:3]):
+            pairs = [(r[:, j], x[:, min(j, x.shape[1] - 1)]) for r, x in zip(rows, others, strict=True)]
+            axes.plot([_correlated(pairs, lag) for lag in range(_MAX_LAG + 1)], ".-", label=component)
+        axes.set(xlabel="samples between", title=f"with the {title}")
+    both[0].legend(fontsize=7)
+    return figure
+
+
+def _correlated(pairs: Sequence[tuple[Array, Array]], lag: int) -> float:
+    """Return the correlation of series with others that are `lag` samples earlier, over all windows."""
+    cut = [(r[lag:], x[: len(x) - lag]) for r, x in pairs if len(r) > lag]
+    products = sum(float(r @ x) for r, x in cut)
+    return products / max(1e-12, math.sqrt(sum(float(r @ r) for r, _ in cut) * sum(float(x @ x) for _, x in cut)))
+
+
 def _predictions(predictions: Sequence[Prediction]) -> Figure:
     shown = [p for p in predictions if p.topic in ("velocity", "angular_velocity")] or list(predictions)
+    shown = [p for p in shown if p.turns_measured] or shown
     figure, panels = _panels(len(shown), 1.9)
     for axes, p in zip(panels, shown, strict=True):
         bars = np.arange(len(p.identified))

@@ -55,6 +55,7 @@ def estimate_intervals(
     inverse: Any = np.linalg.inv(information)
     nominal = np.sqrt(np.diag(inverse))
 
+    runs = len({window.run for window in windows})
     are_correlated = correlated or chi2 > DISAGREES
     pieces, clusters = _pieces(reduced, windows, are_correlated)
     half = NORMAL * nominal
@@ -62,7 +63,10 @@ def estimate_intervals(
         jackknife, freedom = _jackknife(information, inverse, pieces)
         if not are_correlated:  # residuals agree with the noise: degrees of freedom by the number of pieces suffice
             freedom = np.full_like(freedom, len(pieces) - 1.0)
-        half = np.maximum(half, jackknife * student.ppf(0.5 + _COVERAGE / 2.0, freedom))
+        wide = np.maximum(half, jackknife * student.ppf(0.5 + _COVERAGE / 2.0, freedom))
+        # a number of one run is not determined without it: the noise tells its interval, as large as the residuals are
+        of_run = np.array([p.run is not None for p in parameters])
+        half = np.where(of_run & (runs >= _MIN_RUNS), half * np.sqrt(max(1.0, chi2)), wide)
     scale = half / (NORMAL * nominal)
     covariance: Any = inverse * np.outer(scale, scale)
     return Intervals(

@@ -26,6 +26,12 @@ DEFAULT_FREE = (
     "hydrodynamics.added_mass", "hydrodynamics.linear_damping", "hydrodynamics.quadratic_damping",
     "hydrostatics.buoyancy", "hydrostatics.center_of_buoyancy", "thrusters.time_constant",
 )  # fmt: skip
+# with attitude and angular velocity as inputs: what moves along the axes alone
+TRANSLATION_FREE = (
+    *(f"hydrodynamics.added_mass.{i}.{i}" for i in (1, 2, 3)),
+    *(f"hydrodynamics.{kind}_damping.{i}" for kind in ("linear", "quadratic") for i in (1, 2, 3)),
+    "hydrostatics.buoyancy",
+)  # fmt: skip
 NUISANCES: tuple[Kind, ...] = ("current", "force", "delay", "lever", "bias", "scale", "asymmetry", "phase", "trim")
 RANDOM_FORCE = "random_force"  # a nuisance that is eliminated from each window, and no parameter
 DEFAULT_NUISANCES = ("current", "lever", "bias", "scale", "phase")
@@ -78,6 +84,11 @@ class Parameter:
     run: int | None = None  # run of a nuisance; None: all runs
 
     @property
+    def topics(self) -> tuple[str, ...]:
+        """Topics that a delay shifts."""
+        return (self.plant,) if self.plant else TOPICS
+
+    @property
     def is_nuisance(self) -> bool:
         """True for a nuisance, which is no number of the vehicle."""
         return self.kind not in ("plant", "lag", "thrust")
@@ -99,13 +110,13 @@ def free_parameters(vehicle: Vehicle, keys: Sequence[str]) -> list[Parameter]:
     return list(parameters.values())
 
 
-def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
-    """Return the free parameters that are not of the vehicle."""
+def nuisances(names: Sequence[str], logs: Sequence[Log], common_delay: bool = False) -> list[Parameter]:
+    """Return the free parameters that are not of the vehicle; with `common_delay` one delay of all topics."""
     if unknown := [name for name in names if name not in (*NUISANCES, RANDOM_FORCE)]:
         expected = ", ".join((*NUISANCES, RANDOM_FORCE))
         raise IdentificationError(f"--nuisance {unknown[0]}: is unknown, expected some of {expected}")
     components = {
-        "delay": [name for name in TOPICS if any(log.topic(name) for log in logs)],
+        "delay": [""] if common_delay else [name for name in TOPICS if any(log.topic(name) for log in logs)],
         "asymmetry": [f"{i + 1}" for i in range(logs[0].thrust.shape[1])],
         "phase": list(CHANGES),
     }
@@ -121,7 +132,7 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
                 if name == "trim" and axis in "KMN":
                     unit, deviation = "N m", 0.5
                 plant = f"current.{axis}" if name == "current" else axis if name == "delay" else ""
-                full_name = f"{label} {axis}".strip() + suffix
+                full_name = f"{label} {axis or 'all samples'}".strip() + suffix
                 parameters.append(Parameter(full_name, unit, name, 0.0, deviation, plant=plant, index=index, run=run))
     return parameters
 
@@ -175,7 +186,7 @@ def setting_of(
             case "lag":
                 lag = float(x)
             case "delay":
-                delays[p.plant] = float(x)
+                delays |= dict.fromkeys(p.topics, float(x))
             case kind:
                 vectors[kind][p.index] = x
     actuation = forces.actuation(lag, vectors["thrust"], vectors["asymmetry"], vectors["phase"])

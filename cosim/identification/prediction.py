@@ -44,7 +44,7 @@ def validate(
     """Predict windows of runs from their sampled start states alone, and compare with the samples; step [s]."""
     # `modes`: with attitude and angular velocity predicted (False), and with those that were measured as inputs (True).
     starts = np.array([p.start if not p.is_nuisance else x for p, x in zip(parameters, values, strict=True)])
-    delays = {p.plant: float(x) for p, x in zip(parameters, values, strict=True) if p.kind == "delay"}
+    delays = {name: float(x) for p, x in zip(parameters, values, strict=True) if p.kind == "delay" for name in p.topics}
     logs = [move_back(log, delays) for log in logs]
     predictions = []
     for horizon, measured in itertools.product(horizons, modes):
@@ -80,8 +80,8 @@ def _summarize(
     squares = [np.sum(np.square(errors[0][of_run == run]), axis=0) * len(of_run) for run in range(runs)]
     counts = np.bincount(of_run, minlength=runs)
     scores = [np.mean(1.0 - s / (n * spread)) if n else np.nan for s, n in zip(squares, counts, strict=True)]
-    rms = (np.sqrt(np.mean(np.square(e), axis=0)) for e in errors)
-    return Prediction(name, horizon, measured, len(rows), *rms, r2, np.array(scores))
+    identified, start, constant = (np.sqrt(np.mean(np.square(e), axis=0)) for e in errors)
+    return Prediction(name, horizon, measured, len(rows), identified, start, constant, r2, np.array(scores))
 
 
 def _constant_velocity(start: Array, times: Array) -> Array:

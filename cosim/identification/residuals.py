@@ -240,7 +240,7 @@ class Residuals:
         for j, p in enumerate(self.parameters):
             if p.run not in (None, run):
                 continue
-            if p.kind == "delay" and p.plant == topic.name:
+            if p.kind == "delay" and topic.name in p.topics:
                 late = measurements.derivative(topic, motion.states, -motion.rates[:, None], setting.errors)
                 jacobian[:, j] = late.ravel()
             elif p.kind in ("lever", "scale", "bias"):

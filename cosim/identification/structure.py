@@ -9,22 +9,26 @@ import numpy as np
 
 from cosim.errors import IdentificationError
 from cosim.identification.fit import fit, single_thread
-from cosim.identification.log import Log
-from cosim.identification.parameters import Parameter, free_parameters, nuisances, with_mean_nuisances, with_values
+from cosim.identification.log import TOPICS, Log
+from cosim.identification.parameters import (
+    TRANSLATION_FREE,
+    Parameter,
+    free_parameters,
+    nuisances,
+    with_mean_nuisances,
+    with_values,
+)
 from cosim.identification.prediction import validate
 from cosim.identification.residuals import Residuals, normal_equations
 from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
 
 AUTO = "auto"  # in place of names of nuisances
-_BASE = (
-    *(f"hydrodynamics.added_mass.{i}.{i}" for i in (1, 2, 3)),
-    *(f"hydrodynamics.{kind}_damping.{i}" for kind in ("linear", "quadratic") for i in (1, 2, 3)),
-    "hydrostatics.buoyancy",
-)  # fmt: skip
 _COUPLINGS = tuple(f"hydrodynamics.added_mass.{i}.{j}" for i in (1, 2, 3) for j in range(i + 1, 7))
 _HORIZONS = (2.0, 5.0)  # s, of the predictions that are compared
+_HORIZONTAL = 2  # components of the trim along forward and right: the vertical one is that of the buoyancy
 _FOLDS = 2
+_MIN_GAIN = 1e-3
 _CLEAR = 1.0  # standard errors of the mean over the runs, by which a choice must be better
 
 
@@ -45,10 +49,18 @@ class Structure:
     vehicle: Vehicle  # start vehicle, without the damping that is left out
     parameters: tuple[Parameter, ...]
     choices: tuple[Choice, ...]
+    delays: dict[str, float]  # s, of the samples behind the commands, by topic
 
-    def nuisances(self) -> list[str]:
-        """Return the names of the chosen nuisances, as ``--nuisance`` takes them."""
-        return list(dict.fromkeys(p.kind for p in self.parameters if p.is_nuisance))
+    def summary(self) -> str:
+        """Return what was chosen and what not, in sentences."""
+        taken, left = (
+            ", ".join(f"{c.name} ({c.gain:+.3f} ± {c.error:.3f})" for c in self.choices if c.is_taken == is_taken)
+            for is_taken in (True, False)
+        )
+        return (
+            "Chosen by how well runs that were not fitted are predicted 2 and 5 s ahead (change of R², with its "
+            f"standard error over the runs): {taken or 'nothing beside the delay'}. Left out: {left or 'nothing'}."
+        )
 
 
 @dataclass(frozen=True)
@@ -62,6 +74,11 @@ class _Fold:
     test: Sequence[Log]
     runs: Sequence[int]  # indices of the runs to predict
     step: float  # s
+
+    @property
+    def delay(self) -> float:
+        """Fitted delay of the samples behind the commands [s]."""
+        return next(float(x) for p, x in zip(self.parameters, self.values, strict=True) if p.kind == "delay")
 
     def step_to(self, free: Sequence[str], zero: Sequence[str]) -> Array:
         """Return the best values of the free parameters, those of others at their starts or zero, by one step."""
@@ -82,15 +99,15 @@ def choose_structure(logs: Sequence[Log], vehicle: Vehicle, keys: Sequence[str] 
     """Choose nuisances, couplings and damping so that runs that were not fitted are predicted best."""
     if len(logs) < 2 * _FOLDS:
         raise IdentificationError(f"--nuisance {AUTO}: has {len(logs)} runs, expected {2 * _FOLDS} or more to compare")
-    base = [_shared(p) for p in free_parameters(vehicle, keys or _BASE)]
+    base = [_shared(p) for p in free_parameters(vehicle, keys or TRANSLATION_FREE)]
     groups = {
-        "trim": [_shared(p) for p in nuisances(("trim",), logs) if p.index < 3],
+        "trim": [_shared(p) for p in nuisances(("trim",), logs) if p.index < _HORIZONTAL],
         "current": [_shared(p) for p in nuisances(("current",), logs)],
         "lever": [_shared(p) for p in nuisances(("lever",), logs)],
         "scale": [_shared(p) for p in nuisances(("scale",), logs)],
         "coupled added mass": [] if keys else [_shared(p) for p in free_parameters(vehicle, _COUPLINGS)],
     }
-    delays = [_shared(p) for p in nuisances(("delay",), logs)]
+    delays = [_shared(p) for p in nuisances(("delay",), logs, common_delay=True)]
     taken, zero = {*base, *delays}, set[str]()
     folds = [
         _fold(logs, vehicle, base, [name for group in groups.values() for name in group], k) for k in range(_FOLDS)
@@ -103,21 +120,21 @@ def choose_structure(logs: Sequence[Log], vehicle: Vehicle, keys: Sequence[str] 
             if choices[-1].is_taken:
                 taken, best = taken | {*group}, scores
     for kind in ("linear", "quadratic") if not keys else ():
-        group = {name for name in base if f".{kind}_damping." in name}
-        scores = _scores(folds, vehicle, taken, zero | group, len(logs))
+        removed = {name for name in base if f".{kind}_damping." in name}
+        scores = _scores(folds, vehicle, taken, zero | removed, len(logs))
         # the simpler structure is taken where it is not worse
         choice = _compare(f"no {kind} damping", best, scores)
         choices.append(replace(choice, is_taken=choice.gain > 0.0 and not zero))
         if choices[-1].is_taken:
-            zero, best = zero | group, scores
-    every = [*free_parameters(vehicle, (*(keys or _BASE), *(() if keys else _COUPLINGS)))]
-    every += nuisances(("current", "delay", "lever", "scale", "trim"), logs)
-    removed = [p for p in every if _shared(p) in zero]
+            zero, best = zero | removed, scores
+    every = [*free_parameters(vehicle, (*(keys or TRANSLATION_FREE), *(() if keys else _COUPLINGS)))]
+    every += nuisances(("current", "delay", "lever", "scale", "trim"), logs, common_delay=True)
+    absent = [p for p in every if _shared(p) in zero]
     return Structure(
-        with_values(vehicle, removed, np.zeros(len(removed))),
-        tuple(p for p in every if _shared(p) in taken - zero and (p.kind != "trim" or p.index < 3)),
-        tuple(choices),
-    )
+        with_values(vehicle, absent, np.zeros(len(absent))),
+        tuple(p for p in every if _shared(p) in taken - zero and (p.kind != "trim" or p.index < _HORIZONTAL)),
+        tuple(choices), dict.fromkeys(TOPICS, float(np.mean([fold.delay for fold in folds]))),
+    )  # fmt: skip
 
 
 def _fold(logs: Sequence[Log], vehicle: Vehicle, base: Sequence[str], candidates: Sequence[str], k: int) -> _Fold:
@@ -127,7 +144,7 @@ def _fold(logs: Sequence[Log], vehicle: Vehicle, base: Sequence[str], candidates
     known = {
         _shared(p): p for p in free_parameters(vehicle, [n for n in (*base, *candidates) if n.startswith("hydro")])
     }
-    parameters = [known[name] for name in base] + nuisances(("delay",), train)
+    parameters = [known[name] for name in base] + nuisances(("delay",), train, common_delay=True)
     done = fit(train, vehicle, parameters, turns_measured=True)
     added = [known[name] for name in candidates if name in known]
     added += [p for p in nuisances(("current", "lever", "scale", "trim"), train) if _shared(p) in candidates]
@@ -157,7 +174,7 @@ def _compare(name: str, before: Array, after: Array) -> Choice:
     gains = (after - before)[known]
     error = float(np.std(gains, ddof=1) / np.sqrt(len(gains))) if len(gains) > 1 else np.inf
     gain = float(np.mean(gains)) if len(gains) else -np.inf
-    return Choice(name, gain, error, gain > _CLEAR * error)
+    return Choice(name, gain, error, gain > max(_MIN_GAIN, _CLEAR * error))
 
 
 def _shared(p: Parameter) -> str:

@@ -17,6 +17,7 @@ from cosim.errors import IdentificationError
 from cosim.identification.fit import Fit
 from cosim.identification.parameters import with_values
 from cosim.scenario.toml_text import scenario_text
+from plant_fmu.size_estimates import complete_tables
 from plant_fmu.toml_tables import read_toml
 from plant_fmu.vehicle import Vehicle, shipped_vehicles
 
@@ -61,7 +62,7 @@ def name_of_file(out: Path) -> str:
 
 def _start_tables(start: str) -> dict[str, Any]:
     if start not in shipped_vehicles():
-        return read_toml(Path(start))
+        return complete_tables(read_toml(Path(start)))
     with resources.as_file(resources.files("plant_fmu") / "vehicles" / f"{start}.toml") as file:
         return read_toml(file)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 from scipy.signal import correlate, detrend
 
 from cosim.errors import ImportLogError
@@ -19,8 +20,6 @@ _MIN_OVERLAP = 5.0  # s
 _ABSOLUTE = 1e8  # s, from which on times are those of a calendar
 _MAX_SIGNAL = 36_000.0  # s
 
-Signal = Callable[[Array, Array], tuple[str, Array]]  # from times [s] and values to the signal's name and components
-
 
 def _turn(times: Array, quaternions: Array) -> Array:
     angles = np.unwrap(euler_zyx(quaternions), axis=0)
@@ -29,8 +28,8 @@ def _turn(times: Array, quaternions: Array) -> Array:
 
 # quantity: signals that another log may have too; commands go with the accelerations that they cause
 _SIGNALS: dict[str, tuple[tuple[str, Callable[[Array, Array], Array]], ...]] = {
-    "depth": (("depth", lambda t, x: x),),
-    "position": (("depth", lambda t, x: x[:, 2:3]),),
+    "depth": (("depth", lambda t, x: np.gradient(x, t, axis=0)),),
+    "position": (("depth", lambda t, x: np.gradient(x[:, 2:3], t, axis=0)),),
     "rates": (("turn rates", lambda t, x: x), ("acceleration", lambda t, x: np.gradient(x, t, axis=0)[:, 2:])),
     "gyro": (("turn rates", lambda t, x: x),),
     "attitude": (("turn rates", _turn),),
@@ -92,7 +91,7 @@ def _signals(contents: LogContents) -> dict[str, tuple[float, Array]]:
         even = np.arange(times[0], times[-1], _PERIOD)
         width = max(1, round(_SMOOTH / _PERIOD))
         values = np.column_stack([np.interp(even, times, x) for x in rows[first, 2:].T])
-        values = np.apply_along_axis(np.convolve, 0, values, np.full(width, 1.0 / width), "same")
+        values = uniform_filter1d(values, width, axis=0, mode="nearest")
         for name, signal in entries:
             signals[name] = float(times[0]), signal(even, values)
     return signals
@@ -108,7 +107,7 @@ def _lag(first: tuple[float, Array], other: tuple[float, Array]) -> tuple[float,
             correlate(x * x, np.ones(len(y)), method="fft") * correlate(np.ones(len(x)), y * y, method="fft"), 1e-12
         ))  # fmt: skip
         total = total + np.where(
-            ones > max(least, 0.3 * min(len(x), len(y))), correlate(x, y, method="fft") / energy, 0.0
+            ones > max(least, 0.5 * min(len(x), len(y))), correlate(x, y, method="fft") / energy, 0.0
         )
     mean = np.asarray(total) / min(first[1].shape[1], other[1].shape[1])
     peak = int(np.argmax(mean))

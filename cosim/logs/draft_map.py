@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from cosim.errors import ImportLogError
-from cosim.logs.column_map import ColumnMap
 
 # quantities with the names of their columns, as regular expressions that match the whole last part of a name
 _GUESSES: tuple[tuple[str, tuple[str, ...], dict[str, str]], ...] = (
@@ -34,14 +34,11 @@ _TIME = re.compile(r"t|time.*|.*stamp.*|sec(onds)?|.*_time|date.*", re.IGNORECAS
 _UNIT = re.compile(r"[\s_]*[\[(]?(rad/s|deg/s|m/s|cm/s|rad|deg|ms|us|ns|s|m|cm|mm|N|V)[\])]?$")
 
 
-def require_map(columns: ColumnMap | None, topics: Mapping[str, Mapping[str, float]] | None = None) -> ColumnMap:
-    """Return a map; without one, raise ImportLogError with a draft that fits the columns of topics and their rates."""
-    if columns is not None:
-        return columns
+def missing_map(topics: Mapping[str, Mapping[str, float]]) -> ImportLogError:
+    """Return the error of a log without a map, with a draft that fits the columns of its topics and their rates."""
     error = ImportLogError("needs a column map, expected --map FILE: it says which column is what")
-    if topics:
-        error.draft = "".join(f"{line}\n" for line in _draft(topics))
-    raise error
+    error.draft = "".join(f"{line}\n" for line in _draft(topics))
+    return error
 
 
 def _draft(topics: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
@@ -68,7 +65,7 @@ def _draft(topics: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
                 yield from [f"topic = {json.dumps(topic)}"] if topic else []
 
 
-def _quantities(columns: Sequence[str]) -> Iterator[tuple[str, dict[str, object]]]:
+def _quantities(columns: Sequence[str]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the quantities that names of columns suggest, with their tables."""
     left = list(columns)
     for name, patterns, extra in _GUESSES:

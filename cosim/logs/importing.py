@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 import itertools
 import math
 import warnings
@@ -138,7 +139,7 @@ def import_log(
             for k, (path, own_map) in enumerate(logs):
                 (scratch / str(k)).mkdir()
                 parts.append(LogContents(scratch / str(k)))
-                _read(path, own_map, parts[k], lambda part, k=k: report_progress((k + part) / len(logs)))
+                _read(path, own_map, parts[k], functools.partial(_report_part, report_progress, k, len(logs)))
                 if k:
                     offset, found = clock_offset(parts[0], parts[k])
                     parts[0].remarks.append(f"Clocks of {logs[0][0].name} and {path.name} are joined {found}.")
@@ -154,6 +155,10 @@ def import_log(
         raise named from error
     except OSError as error:
         raise ImportLogError(f"{path}: {error.strerror or error}") from error
+
+
+def _report_part(report_progress: OnProgress, done: int, count: int, part: float) -> None:
+    report_progress((done + part) / count)
 
 
 def _read(path: Path, column_map: ColumnMap | None, contents: LogContents, on_progress: OnProgress) -> None:

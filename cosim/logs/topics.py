@@ -152,7 +152,8 @@ def _continuous(quantity: str, values: Array) -> Array:
     if quantity != "attitude" or len(values) < 2:
         return values
     signs = np.where(np.sum(values[1:] * values[:-1], axis=1) < 0.0, -1.0, 1.0)
-    return values * np.concatenate([[1.0], np.cumprod(signs)])[:, None]
+    result: Array = values * np.concatenate([[1.0], np.cumprod(signs)])[:, None]
+    return result
 
 
 def _freeze(topic: Topic, at: Array, keys: Keys) -> str:

@@ -18,7 +18,7 @@ from cosim.logs.blueos import find_vehicle, read_recording
 from cosim.logs.chunked_file import OnProgress
 from cosim.logs.clocks import Clock
 from cosim.logs.column_map import ColumnMap
-from cosim.logs.draft_map import require_map
+from cosim.logs.draft_map import missing_map
 from cosim.logs.frames import UNITS
 from cosim.logs.message_definitions import parse_definition, reachable_types
 from cosim.logs.spool import LogContents
@@ -40,7 +40,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progre
         if recorded:
             read_recording(path, *recorded, contents, on_progress)
             return
-        require_map(None, _fields(path))
+        raise missing_map(_fields(path))
     without_topic = next((name for name, mapped in columns.quantities.items() if not mapped.topic), None)
     if without_topic is not None:
         raise ImportLogError(f"the map says no topic for [{without_topic}], expected topic and columns")

@@ -22,7 +22,7 @@ from cosim.errors import ImportLogError
 from cosim.logs.chunked_file import OnProgress
 from cosim.logs.clocks import Clock
 from cosim.logs.column_map import ColumnMap, TimeColumn
-from cosim.logs.draft_map import require_map
+from cosim.logs.draft_map import missing_map
 from cosim.logs.frames import UNITS
 from cosim.logs.spool import LogContents
 from cosim.simulation.signals import Array
@@ -50,7 +50,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progre
     """Read a table, as specified by `LogFormat`; raise ImportLogError if a column is missing or not numeric."""
     layout = _layout(path)
     if columns is None:
-        require_map(None, _rates(path, layout))
+        raise missing_map(_rates(path, layout))
     times_of = {name: _require_time(columns, name) for name in columns.quantities}
     names = {column for mapped in columns.quantities.values() for column in mapped.needs}
     stamps = {time.column: time for time in times_of.values()}
@@ -179,7 +179,7 @@ def _numbers(batch: Any, column: str, layout: _Layout, texts: Counter[str]) -> A
             raise ImportLogError(
                 f"column {column!r} has {values[int(odd[0])].as_py()[:30]!r}, expected numbers"
             ) from error
-        return parsed
+        numbers = np.asarray(parsed, float)
     return numbers
 
 

@@ -1,8 +1,7 @@
-"""Pairs of tables as a pool session leaves them: a commanded wrench, and a navigation filter with repeats and bursts."""
+"""Pairs of tables of a pool session: a commanded wrench, and a navigation filter with repeats and bursts."""
 
 import numpy as np
 import pandas as pd
-
 
 STEP = 0.01  # s
 MASS, WEIGHT = 11.5, 112.8
@@ -32,10 +31,8 @@ file = "*nav*.csv"
 columns = ["depth"]
 """
 VEHICLE = """name = "pool"
-[rigid_body]
-mass = 11.5      # kg
-[hull]
-size = [0.46, 0.34, 0.25]  # m, length, width, height
+rigid_body.mass = 11.5  # kg
+hull.size = [0.46, 0.34, 0.25]  # m: length, width, height
 """
 
 
@@ -78,7 +75,7 @@ def simulate(rng, runs=16, seconds=60.0, disturbance=0.8):
     inverse = np.linalg.inv(M)
     current = rng.uniform(-0.06, 0.06, (runs, 3)) * [1, 1, 0]
     n = int(seconds / STEP)
-    angles, nu, depth = np.zeros((runs, 3)), np.zeros((runs, 6)), np.full(runs, 2.0)
+    angles, nu, depth = np.zeros((runs, 3)), np.zeros((runs, 6)), np.full(runs, 8.0)
     angles[:, 2] = rng.uniform(-3, 3, runs)
     acting, push = np.zeros((runs, 6)), np.zeros((runs, 3))
     out = np.empty((runs, n, 10))
@@ -151,7 +148,8 @@ def write_pairs(folder, seed=0, runs=16, seconds=60.0, noise=0.012, disturbance=
             again = np.sort(np.concatenate([np.arange(len(came)), rng.integers(0, len(came), len(came) // 10)]))
             came, rows = came[again], rows[again]
         pd.DataFrame({
-            "time": begin + came, "yaw": np.remainder(rows[:, 2] + np.pi, 2 * np.pi) - np.pi, "pitch": rows[:, 1], "roll": rows[:, 0], "u": rows[:, 3],
+            "time": begin + came, "yaw": np.remainder(rows[:, 2] + np.pi, 2 * np.pi) - np.pi,
+            "pitch": rows[:, 1], "roll": rows[:, 0], "u": rows[:, 3],
             "v": rows[:, 4], "w": rows[:, 5], "depth": rows[:, 9],
         }).to_csv(folder / f"run-{run:02d}-nav.csv", index=False, float_format="%.5f")  # fmt: skip
     (folder / "map.toml").write_text(MAP)

@@ -100,6 +100,43 @@ def test_sensitivities_match_central_differences(shooter):
         assert np.abs(found[:, j] - expected).max() <= 1e-6 * max(scale, 1e-3), along.parameters[j]
 
 
+def measured(shooter, start, wrench):
+    """Quaternions and angular velocities of the free motion at the ends of its steps."""
+    times = np.arange(STEPS + 1) * STEP
+    return shooter.predict(BODY, start, wrench, STEP, times).states[:, [3, 4, 5, 6, 10, 11, 12]]
+
+
+def test_true_turns_as_inputs_give_the_same_motion(shooter):
+    start, wrench = start_and_wrench()
+    times = np.linspace(0.1, STEP * STEPS, 20)
+    free = shooter.predict(BODY, start, wrench, STEP, times).states
+    turns = measured(shooter, start, wrench)
+    given = shooter.predict(BODY, start, wrench, STEP, times, turns=turns).states
+    assert np.abs(given - free).max() < 2e-3
+    pushed = np.add(wrench, [0, 0, 0, 3.0, -2.0, 4.0])  # moments that the turns do not show change nothing
+    assert np.abs(shooter.predict(BODY, start, pushed, STEP, times, turns=turns).states - given).max() < 1e-9
+
+
+def test_sensitivities_with_given_turns_match_central_differences(shooter):
+    start, wrench = start_and_wrench()
+    turns, times = measured(shooter, start, wrench), np.array([0.5, 1.3, 2.0])
+    along = all_directions(np.random.default_rng(2))
+    along.start[3:7], along.start[10:13] = 0.0, 0.0  # these are inputs
+    found = shooter.predict(BODY, start, wrench, STEP, times, along, turns=turns).tangents
+    for j, name in enumerate(along.parameters):
+        row, h = along.inputs[j], 1e-5 * max(1.0, abs(BODY.get(name or "", 0.0)))
+        ends = [
+            shooter.predict(
+                BODY | ({name: BODY[name] + by} if name else {}), start + by * along.start[j],
+                wrench + (by * along.wrench[row] if row is not None else 0.0), STEP, times, force=by * along.force[j],
+                turns=turns,
+            ).states
+            for by in (h, -h)
+        ]  # fmt: skip
+        expected = (ends[0] - ends[1]) / (2 * h)
+        assert np.abs(found[:, j] - expected).max() <= 1e-4 * max(np.abs(expected).max(), 1e-3), name
+
+
 def test_invalid_body_parameters_are_rejected(shooter):
     start, wrench = start_and_wrench()
     with pytest.raises(IdentificationError, match="not positive definite"):
