@@ -22,8 +22,7 @@ from cosim.identification.parameters import (
     nuisances,
     with_mean_nuisances,
 )
-from cosim.identification.prediction import Prediction, validate
-from cosim.identification.structure import AUTO, Structure, choose_structure
+from cosim.identification.prediction import AUTO, Prediction, Structure, choose_structure, validate
 from cosim.identification.vehicle_file import name_of_file, posterior_lines, vehicle_text
 from cosim.io.atomic_file import reason, write_together
 from cosim.report.web_page import render_page

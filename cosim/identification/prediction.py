@@ -1,25 +1,40 @@
-"""Validation: errors of free-running predictions from start states that the samples give."""
+"""Validation: errors of predictions from start states that the samples give; and choice of a structure by them."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cosim.errors import IdentificationError
 from cosim.identification.delays import move_back
+from cosim.identification.fit import fit, single_thread
 from cosim.identification.log import TOPICS, Log
 from cosim.identification.measurements import NO_ERRORS, residual
-from cosim.identification.parameters import Parameter
-from cosim.identification.residuals import Residuals
+from cosim.identification.parameters import (
+    TRANSLATION_FREE,
+    Parameter,
+    free_parameters,
+    nuisances,
+    with_mean_nuisances,
+    with_values,
+)
+from cosim.identification.residuals import Residuals, normal_equations
 from cosim.identification.windows import cut_windows
 from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
 
 HORIZONS = (2.0, 5.0, 10.0)  # s, lengths of the predictions
+AUTO = "auto"  # in place of names of nuisances
+_COUPLINGS = tuple(f"hydrodynamics.added_mass.{i}.{j}" for i in (1, 2, 3) for j in range(i + 1, 7))
+_HORIZONS = (2.0, 5.0)  # s, of the predictions that are compared
+_HORIZONTAL = 2  # components of the trim along forward and right: the vertical one is that of the buoyancy
+_FOLDS = 2
+_MIN_GAIN = 1e-3
+_CLEAR = 1.0  # standard errors of the mean over the runs, by which a choice must be better
 
 
 @dataclass(frozen=True)
@@ -91,3 +106,153 @@ def _constant_velocity(start: Array, times: Array) -> Array:
     turned = attitude * Rotation.from_rotvec(times[:, None] * start[10:13])
     velocity = np.broadcast_to(start[7:], (len(times), 6))
     return np.hstack([position, turned.as_quat(scalar_first=True), velocity])
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A candidate and its effect on the prediction of runs that were not fitted."""
+
+    name: str
+    gain: float  # mean change of the coefficient of determination over the runs
+    error: float  # standard error of that mean
+    is_taken: bool
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The chosen structure."""
+
+    vehicle: Vehicle  # start vehicle, without the damping that is left out
+    parameters: tuple[Parameter, ...]
+    choices: tuple[Choice, ...]
+    delays: dict[str, float]  # s, of the samples behind the commands, by topic
+
+    def summary(self) -> str:
+        """Return what was chosen and what not, in sentences."""
+        taken, left = (
+            ", ".join(f"{c.name} ({c.gain:+.3f} ± {c.error:.3f})" for c in self.choices if c.is_taken == is_taken)
+            for is_taken in (True, False)
+        )
+        return (
+            "Chosen by how well runs that were not fitted are predicted 2 and 5 s ahead (change of R², with its "
+            f"standard error over the runs): {taken or 'nothing beside the delay'}. Left out: {left or 'nothing'}."
+        )
+
+
+@dataclass(frozen=True)
+class _Fold:
+    """Normal equations of all candidates at a fit of some runs, and the runs to predict."""
+
+    parameters: Sequence[Parameter]
+    values: Array  # (p,) of the fit; candidates that are not fitted at their starts
+    information: Array  # (p, p)
+    score: Array  # (p,)
+    test: Sequence[Log]
+    runs: Sequence[int]  # indices of the runs to predict
+    step: float  # s
+
+    @property
+    def delay(self) -> float:
+        """Fitted delay of the samples behind the commands [s]."""
+        return next(float(x) for p, x in zip(self.parameters, self.values, strict=True) if p.kind == "delay")
+
+    def step_to(self, free: Sequence[str], zero: Sequence[str]) -> Array:
+        """Return the best values of the free parameters, those of others at their starts or zero, by one step."""
+        names = [_shared(p) for p in self.parameters]
+        fixed = np.array([0.0 if name in zero else p.start for name, p in zip(names, self.parameters, strict=True)])
+        move = np.array([name not in free or name in zero for name in names])
+        change = np.where(move, fixed - self.values, 0.0)
+        left = ~move
+        right = -self.score[left] - self.information[np.ix_(left, move)] @ change[move]
+        change[left] = np.linalg.solve(self.information[np.ix_(left, left)], right)
+        low, high = (np.array([getattr(p, name) for p in self.parameters]) for name in ("min", "max"))
+        values: Array = np.clip(self.values + change, low, high)
+        return values
+
+
+@single_thread()
+def choose_structure(logs: Sequence[Log], vehicle: Vehicle, keys: Sequence[str] | None) -> Structure:
+    """Choose nuisances, couplings and damping so that runs that were not fitted are predicted best."""
+    if len(logs) < 2 * _FOLDS:
+        raise IdentificationError(f"--nuisance {AUTO}: has {len(logs)} runs, expected {2 * _FOLDS} or more to compare")
+    base = [_shared(p) for p in free_parameters(vehicle, keys or TRANSLATION_FREE)]
+    groups = {
+        "trim": [_shared(p) for p in nuisances(("trim",), logs) if p.index < _HORIZONTAL],
+        "current": [_shared(p) for p in nuisances(("current",), logs)],
+        "lever": [_shared(p) for p in nuisances(("lever",), logs)],
+        "scale": [_shared(p) for p in nuisances(("scale",), logs)],
+        "coupled added mass": [] if keys else [_shared(p) for p in free_parameters(vehicle, _COUPLINGS)],
+    }
+    delays = [_shared(p) for p in nuisances(("delay",), logs, common_delay=True)]
+    taken, zero = {*base, *delays}, set[str]()
+    folds = [
+        _fold(logs, vehicle, base, [name for group in groups.values() for name in group], k) for k in range(_FOLDS)
+    ]
+    best, choices = _scores(folds, vehicle, taken, zero, len(logs)), list[Choice]()
+    for name, group in groups.items():
+        if group:
+            scores = _scores(folds, vehicle, taken | {*group}, zero, len(logs))
+            choices.append(_compare(name, best, scores))
+            if choices[-1].is_taken:
+                taken, best = taken | {*group}, scores
+    for kind in ("linear", "quadratic") if not keys else ():
+        removed = {name for name in base if f".{kind}_damping." in name}
+        scores = _scores(folds, vehicle, taken, zero | removed, len(logs))
+        # the simpler structure is taken where it is not worse
+        choice = _compare(f"no {kind} damping", best, scores)
+        choices.append(replace(choice, is_taken=choice.gain > 0.0 and not zero))
+        if choices[-1].is_taken:
+            zero, best = zero | removed, scores
+    every = [*free_parameters(vehicle, (*(keys or TRANSLATION_FREE), *(() if keys else _COUPLINGS)))]
+    every += nuisances(("current", "delay", "lever", "scale", "trim"), logs, common_delay=True)
+    absent = [p for p in every if _shared(p) in zero]
+    return Structure(
+        with_values(vehicle, absent, np.zeros(len(absent))),
+        tuple(p for p in every if _shared(p) in taken - zero and (p.kind != "trim" or p.index < _HORIZONTAL)),
+        tuple(choices), dict.fromkeys(TOPICS, float(np.mean([fold.delay for fold in folds]))),
+    )  # fmt: skip
+
+
+def _fold(logs: Sequence[Log], vehicle: Vehicle, base: Sequence[str], candidates: Sequence[str], k: int) -> _Fold:
+    """Fit the base to the runs that are not of fold k, and linearize all candidates there."""
+    train = [log for run, log in enumerate(logs) if run % _FOLDS != k]
+    runs = [run for run in range(len(logs)) if run % _FOLDS == k]
+    known = {
+        _shared(p): p for p in free_parameters(vehicle, [n for n in (*base, *candidates) if n.startswith("hydro")])
+    }
+    parameters = [known[name] for name in base] + nuisances(("delay",), train, common_delay=True)
+    done = fit(train, vehicle, parameters, turns_measured=True)
+    added = [known[name] for name in candidates if name in known]
+    added += [p for p in nuisances(("current", "lever", "scale", "trim"), train) if _shared(p) in candidates]
+    every = [*done.parameters, *added]
+    values = np.concatenate([done.values, [p.start for p in added]])
+    problem = Residuals(done.logs, vehicle, every, done.windows, done.step, turns_measured=True)
+    problem.weights = list(done.weights)
+    information, score, *_ = normal_equations(problem, values)
+    return _Fold(every, values, information, score, [logs[run] for run in runs], runs, done.step)
+
+
+def _scores(folds: Sequence[_Fold], vehicle: Vehicle, free: set[str], zero: set[str], runs: int) -> Array:
+    """Return the mean coefficient of determination of the velocities of each run, from fits of the others."""
+    scores = np.full(runs, np.nan)
+    for fold in folds:
+        values = fold.step_to([*free], [*zero])
+        found = validate(
+            fold.test, vehicle, *with_mean_nuisances(fold.parameters, values), fold.step, _HORIZONS, (True,)
+        )
+        by_horizon = [p.scores for p in found if p.topic in ("velocity", "position")]
+        scores[[*fold.runs]] = np.mean(by_horizon, axis=0) if by_horizon else -np.inf
+    return scores
+
+
+def _compare(name: str, before: Array, after: Array) -> Choice:
+    known = np.isfinite(before) & np.isfinite(after)
+    gains = (after - before)[known]
+    error = float(np.std(gains, ddof=1) / np.sqrt(len(gains))) if len(gains) > 1 else np.inf
+    gain = float(np.mean(gains)) if len(gains) else -np.inf
+    return Choice(name, gain, error, gain > max(_MIN_GAIN, _CLEAR * error))
+
+
+def _shared(p: Parameter) -> str:
+    """Return the name of a parameter without its run."""
+    return p.name.partition(" of run ")[0]

@@ -14,7 +14,7 @@ from typing import Any
 from cosim.errors import ImportLogError
 from cosim.logs.bag_storage import DAMAGE, MAX_DECODED, StoredMessage, stored_messages
 from cosim.logs.chunked_file import OnProgress
-from cosim.logs.clocks import Clock
+from cosim.logs.cleaning.clocks import Clock
 from cosim.logs.spool import LogContents
 from cosim.logs.vehicle_messages import AUTOPILOT, MESSAGES, NO_AUTOPILOT, VehicleMessages
 from cosim.mavlink.wire.dialect import dialect

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from cosim.errors import ImportLogError
-from cosim.logs.topics import Topic
+from cosim.logs.cleaning.topics import Topic
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle

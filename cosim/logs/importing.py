@@ -19,17 +19,17 @@ import numpy as np
 from cosim.errors import ImportLogError, RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
-from cosim.logs.alignment import clock_offset
 from cosim.logs.assignment import assign_quantities, format_of
 from cosim.logs.chunked_file import OnProgress
-from cosim.logs.clocks import VehicleClock
+from cosim.logs.cleaning.alignment import clock_offset
+from cosim.logs.cleaning.clocks import VehicleClock
+from cosim.logs.cleaning.topics import Topic
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.forces import CURVES, CommandForces, command_forces
 from cosim.logs.quantities import COMMANDS
 from cosim.logs.rows import RowMaker
 from cosim.logs.selection import default_rate, has_plausible_rate, select_topics, time_span
 from cosim.logs.spool import LogContents
-from cosim.logs.topics import Topic
 from cosim.results.log_facts import ATTITUDE, ATTITUDE_TIME, COMMAND_TIME, IMPORT, LogFacts, TopicFacts
 from cosim.results.record import MAX_ROWS
 from cosim.results.recorder import Recorder

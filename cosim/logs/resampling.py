@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from cosim.logs.cleaning.topics import Topic
 from cosim.logs.spool import BLOCK
-from cosim.logs.topics import Topic
 from cosim.simulation.signals import Array
 
 _EXACT = 1e-6  # s, tolerance of equal times; for seconds since 1970, float64 resolves a quarter of it

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosim.logs.cleaning.topics import Topic
 from cosim.logs.forces import CommandForces
 from cosim.logs.frames import euler_zyx, rotate_to_body
 from cosim.logs.resampling import TopicReader
-from cosim.logs.topics import Topic
 from cosim.results.log_facts import ATTITUDE, ATTITUDE_TIME, COMMAND_TIME
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.environment import RegionEnvironment

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from cosim.errors import ImportLogError
-from cosim.logs.clocks import VehicleClock
+from cosim.logs.cleaning.clocks import VehicleClock
+from cosim.logs.cleaning.topics import Topic, clean
 from cosim.logs.quantities import COMMANDS, QUANTITIES
 from cosim.logs.spool import LogContents, Source
-from cosim.logs.topics import Topic, clean
 from cosim.simulation.signals import Array
 
 RATES = (5, 10, 20, 25, 50, 100, 200)  # Hz, default rates of rows

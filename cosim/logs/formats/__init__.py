@@ -2,7 +2,7 @@
 
 To add a format, add a module to this folder, and its suffixes to `FORMATS`.
 
-Imports: mavlink.wire, plant_fmu, simulation.
+Imports: logs.cleaning, mavlink.wire, plant_fmu, simulation.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from cosim.errors import ImportLogError
 from cosim.logs.bag_storage import DAMAGE, MAX_DECODED, StoredMessage, bag_files, stored_messages
 from cosim.logs.blueos import find_vehicle, read_recording
 from cosim.logs.chunked_file import OnProgress
-from cosim.logs.clocks import Clock
+from cosim.logs.cleaning.clocks import Clock
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.draft_map import missing_map
 from cosim.logs.frames import UNITS

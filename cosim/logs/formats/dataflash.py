@@ -14,7 +14,7 @@ from pymavlink.DFReader import DFFormat
 
 from cosim.errors import ImportLogError
 from cosim.logs.chunked_file import ChunkedFile, OnProgress
-from cosim.logs.clocks import Clock
+from cosim.logs.cleaning.clocks import Clock
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.frames import ReadComponents, attitude_of_angles, attitude_of_quaternion, scale_fields
 from cosim.logs.spool import LogContents, handled_names

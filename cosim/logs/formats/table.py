@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv
@@ -20,7 +19,7 @@ import pyarrow.parquet as pq
 
 from cosim.errors import ImportLogError
 from cosim.logs.chunked_file import OnProgress
-from cosim.logs.clocks import Clock
+from cosim.logs.cleaning.clocks import Clock
 from cosim.logs.column_map import ColumnMap, TimeColumn
 from cosim.logs.draft_map import missing_map
 from cosim.logs.frames import UNITS
@@ -32,7 +31,9 @@ _ROWS = 2**15  # rows of a Parquet file that are read at once
 _BLOCK = 1 << 19  # bytes of a CSV file that are read at once; the reader is up to 32 such blocks ahead
 _MISSING = ["", "nan", "NaN", "NAN", "-nan", "null", "NULL", "None", "N/A", "n/a", "inf", "-inf"]
 _MARKS = {codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16", codecs.BOM_UTF8: "utf-8-sig"}
-_FLAGS = {text: int(text.lower() == "true") for text in ("true", "True", "TRUE", "false", "False", "FALSE")}
+_FLAGS = {"true": "1", "false": "0"}
+_NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
+_DATE = r"^\s*\d{4}-\d\d-\d\d"
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+\s*")
 _MAX_TEXTS = 0.5  # maximum fraction of a column's cells that are texts, and left out
 
@@ -170,8 +171,11 @@ def _numbers(batch: Any, column: str, layout: _Layout, texts: Counter[str]) -> A
     except pa.ArrowException as error:
         if not pa.types.is_string(values.type):
             raise ImportLogError(f"column {column!r} is {values.type}, expected numbers") from error
-        cells = values.to_pandas().replace(_FLAGS)
-        parsed = pd.to_numeric(cells, errors="coerce").to_numpy(float)
+        cells = pc.utf8_trim_whitespace(values)
+        for text, number in _FLAGS.items():
+            cells = pc.if_else(pc.equal(pc.utf8_lower(cells), text), number, cells)
+        cells = pc.if_else(pc.match_substring_regex(cells, _NUMBER), cells, pa.scalar(None, pa.string()))
+        parsed = np.asarray(pc.fill_null(cells.cast(pa.float64()), float("nan")))
         known = np.asarray(pc.is_valid(values))
         odd = np.flatnonzero(np.isnan(parsed) & known)
         texts[column] += len(odd)
@@ -186,18 +190,21 @@ def _numbers(batch: Any, column: str, layout: _Layout, texts: Counter[str]) -> A
 def _seconds(batch: Any, time: TimeColumn, layout: _Layout, texts: Counter[str]) -> Array:
     values = batch.column(batch.schema.get_field_index(time.column))
     if pa.types.is_timestamp(values.type) or time.unit == "iso8601":
-        if pa.types.is_timestamp(values.type):
-            moments = values.cast(pa.timestamp("ns")).to_pandas()
-        else:
-            moments = pd.to_datetime(pd.Series(values.to_pandas()), format="ISO8601", utc=True, errors="coerce")
-            odd = np.flatnonzero(moments.isna().to_numpy() & np.asarray(pc.is_valid(values)))
+        if pa.types.is_string(values.type):
+            is_date = pc.match_substring_regex(values, _DATE)
+            odd = np.flatnonzero(~np.asarray(pc.fill_null(is_date, True)))
             texts[time.column] += len(odd)
-            if len(odd) > _MAX_TEXTS * len(values):
-                raise ImportLogError(
-                    f"column {time.column!r} has {values[int(odd[0])].as_py()[:30]!r}, expected times of ISO 8601"
-                )
-        since = pd.to_datetime(moments, utc=True) - pd.Timestamp(0, tz="UTC")
-        seconds: Array = since.dt.total_seconds().to_numpy(float)
+            if len(odd) <= _MAX_TEXTS * len(values):
+                values = pc.if_else(is_date, values, pa.scalar(None, pa.string()))
+        try:
+            moments = values.cast(pa.timestamp("ns", tz="UTC" if pa.types.is_string(values.type) else None))
+        except pa.ArrowException:
+            try:
+                moments = values.cast(pa.timestamp("ns"))
+            except pa.ArrowException as error:
+                raise ImportLogError(f"column {time.column!r}: {error}, expected times of ISO 8601") from error
+        nanoseconds = pc.fill_null(moments.cast(pa.int64()).cast(pa.float64(), safe=False), float("nan"))
+        seconds: Array = np.asarray(nanoseconds) * 1e-9
         return seconds
     return _numbers(batch, time.column, layout, texts) * UNITS["s"][time.unit]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cosim.errors import ImportLogError
 from cosim.logs.chunked_file import ChunkedFile, OnProgress
-from cosim.logs.clocks import Clock
+from cosim.logs.cleaning.clocks import Clock
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.spool import LogContents
 from cosim.logs.vehicle_messages import AUTOPILOT, MESSAGES, NO_AUTOPILOT, VehicleMessages

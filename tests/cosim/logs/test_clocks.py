@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cosim.logs.clocks import Clock, VehicleClock
+from cosim.logs.cleaning.clocks import Clock, VehicleClock
 
 
 def put(clock, stamps, written):

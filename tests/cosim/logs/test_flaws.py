@@ -7,7 +7,7 @@ import pytest
 import cosim
 from cosim.command_line.cli import main
 from cosim.errors import ImportLogError
-from cosim.logs.sample_times import drop_held, put_in_order
+from cosim.logs.cleaning.sample_times import drop_held, put_in_order
 from cosim.results.log_facts import load_log_facts
 from tests.cosim.logs.conftest import has_remark
 

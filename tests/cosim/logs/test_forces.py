@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cosim.errors import ImportLogError
+from cosim.logs.cleaning.topics import Topic
 from cosim.logs.forces import command_forces, servo_outputs
-from cosim.logs.topics import Topic
 from plant_fmu import load_vehicle
 from plant_fmu.autopilot import effort_of_pulse
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cosim.errors import ImportLogError
+from cosim.logs.cleaning.topics import clean
 from cosim.logs.resampling import TopicReader
-from cosim.logs.topics import clean
 
 
 def cleaned(contents, tmp_path, quantity, times, values):

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from cosim.errors import ImportLogError
+from cosim.logs.cleaning.sample_times import Index, Keys, drop_duplicates, drop_held, longest_freeze, put_in_order
 from cosim.logs.quantities import QUANTITIES
-from cosim.logs.sample_times import Index, Keys, drop_duplicates, drop_held, longest_freeze, put_in_order
 from cosim.logs.spool import BLOCK, Source
 from cosim.simulation.signals import Array
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from cosim.logs.sample_times import is_shuffled
+from cosim.logs.cleaning.sample_times import is_shuffled
 from cosim.simulation.signals import Array
 
 _MAX_STEP_BACK = 1.0  # s; a step back by more is a jump, not a message out of order
