@@ -90,8 +90,8 @@ class Shooter:
         turns: Array | None = None,
     ) -> Motion:
         """Predict the motion under a wrench that is linear over each step; start [m, NED]."""
-        # Units of arguments: wrench [N, N m, body frame], step [s], times [s], force [N, NED], turns (steps + 1, 7): quaternion and
-        # angular velocity [rad/s] at the ends of the steps, which then are not predicted
+        # Units of arguments: wrench [N, N m, body frame]; step [s]; times [s]; force [N, NED]; turns (steps + 1, 7):
+        # quaternion and angular velocity [rad/s] at the ends of the steps, which then are not predicted
         along = directions or NO_DIRECTIONS
         d, n = len(along.parameters), len(times)
         references = [self._references[name] for name in parameters]
