@@ -17,9 +17,8 @@ from cosim.errors import IdentificationError
 from cosim.identification.fit import Fit
 from cosim.identification.parameters import with_values
 from cosim.scenario.toml_text import scenario_text
-from plant_fmu.size_estimates import complete_tables
 from plant_fmu.toml_tables import read_toml
-from plant_fmu.vehicle import Vehicle, shipped_vehicles
+from plant_fmu.vehicle import Vehicle, complete_tables, shipped_vehicles
 
 DRAWS = 256  # number of drawn vehicles
 _MAX_TRIALS = 100  # draws per vehicle, until its mass matrix is positive definite

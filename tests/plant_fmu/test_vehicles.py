@@ -263,3 +263,22 @@ def test_pulse_and_effort_are_inverse_functions(curve, sign):
     ends = [table.pwm_neutral - sign * table.pwm_span, table.pwm_neutral + sign * table.pwm_span]
     assert [pulse(-1.0), pulse(1.0)] == ends == [pulse(-7.0), pulse(7.0)]
     assert pulse(0.0) == pulse(float("nan")) == table.pwm_neutral
+
+
+def test_mass_and_size_suffice(tmp_path):
+    """Two numbers begin an identification: neutral, upright, box-like; what the file says is kept."""
+    file = tmp_path / "pool.toml"
+    file.write_text(
+        'name = "pool"\nrigid_body.mass = 12.0\nhull.size = [0.6, 0.4, 0.3]\nhydrostatics.buoyancy = 119.0\n'
+    )
+    vehicle = load_vehicle(file)
+    assert np.diag(vehicle.inertia) == pytest.approx([0.25, 0.45, 0.52])  # of a solid box, by hand
+    assert vehicle.weight == pytest.approx(117.72) and vehicle.buoyancy == 119.0 and vehicle.r_B[2] < 0.0
+    assert vehicle.quadratic_damping[:3] == pytest.approx([60.0, 90.0, 120.0])
+    assert not vehicle.thruster_matrix.any()
+    file.write_text('name = "pool"\nrigid_body.mass = 12.0\nhull.size = [0.6, "wide", 0.3]\n')
+    with pytest.raises(VehicleError, match=r"hull\.size"):
+        load_vehicle(file)
+    file.write_text('name = "pool"\nrigid_body.mass = 12.0\n')
+    with pytest.raises(VehicleError, match="missing"):
+        load_vehicle(file)
