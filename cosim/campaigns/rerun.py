@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -102,11 +101,8 @@ def require_complete(folder: Path) -> None:
 
 def _sweep_repeat(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
     work = SweepWork(load_scenario(folder / SCENARIO), design_of(plan))
-    scenarios = (
-        {"scenario": rename_former_keys(plan["scenario"])},
-        {"scenario": json.loads(json.dumps(work.plan["scenario"]))},
-    )
-    if differences := difference(*scenarios):
+    scenario_before = rename_former_keys(plan["scenario"])
+    if differences := difference({"scenario": scenario_before}, {"scenario": work.plan["scenario"]}):
         raise RunError(f"{folder / SCENARIO}: is not that of the campaign ({differences})")
     if plan["vehicle_sha256"] != work.plan["vehicle_sha256"]:
         raise RunError(f"{folder / VEHICLE_COPY}: is not that of the campaign")

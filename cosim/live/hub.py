@@ -141,7 +141,7 @@ class Hub:
 
     def say(self, text: str, kind: str = "info", time: float | None = None) -> None:
         """Show a `text` to all viewers; `kind` is info, command or warning, `time` simulated [s]."""
-        self._add_text(format_message("said", kind=kind, text=text, time=time))
+        self._add_text(format_message("message", kind=kind, text=text, time=time))
 
     def end(self, status: str, verdict: str) -> None:
         """Show the `status` and `verdict` of a run that has ended."""

@@ -174,4 +174,4 @@ class _Viewers:
             allowance -= 1.0
             reason = "the run has not begun" if self._hub.desk is None else self._hub.desk.submit(message)
             if reason is not None:
-                await connection.send(format_message("said", kind="refused", text=reason, time=None))
+                await connection.send(format_message("message", kind="refused", text=reason, time=None))

@@ -33,7 +33,7 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool | li
         "version": VERSION,
         "name": scenario.name,
         "title": scenario.title,
-        "asked": describe_task(scenario),
+        "task": describe_task(scenario),
         "law": scenario.law.name,
         "imported": scenario.log,
         "step": scenario.time.step,
@@ -100,7 +100,7 @@ def _region(scenario: Scenario, index: int, limits: Bounds) -> dict[str, Any]:
         "gain": region.gain,
         "moves": region.name in scenario.moving,
         # present only while it is shifted; never, for the missing goal of a log
-        "comes": secondary.is_dynamic if secondary else not scenario.has_goal,
+        "is_dynamic": secondary.is_dynamic if secondary else not scenario.has_goal,
         "unit": "rad" if of_attitude(region.shape) else "m",  # of its clearance
         "shape": shape_of(region.shape, limits),
         **({"places": _goal_places(scenario)} if scenario.goal_then and not secondary else {}),

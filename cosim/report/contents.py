@@ -36,7 +36,7 @@ def contents_of(run: Run) -> dict[str, Any]:
     side = f"{format_number(abs(outside), 4)} m {'outside' if outside > 0.0 else 'inside'}"
     windows = ", ".join(f"{start:.3f} to {end:.3f}" for start, end in run.summary["intersection_windows"])
     return {
-        "asked": describe_task(s),
+        "task": describe_task(s),
         "verdict": verdict(run.summary),
         "remarks": _remarks(run),
         "claims": _claims(run),

@@ -20,7 +20,7 @@ from cosim.campaigns.scenes.scene_tables import (
     scenario_table,
     sphere_table,
     thruster_lags,
-)
+)  # fmt: skip
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
 Kinds = dict[str, Callable[[Generator], tuple[Table, list[Table]]]]

@@ -13,7 +13,15 @@ from collections.abc import Callable
 import numpy as np
 
 from controller.laws.deployable.gains import DeployableGains
-from cosim.campaigns.scenes.scene_tables import Generator, Table, horizontal, scenario_table, sphere_table
+from cosim.campaigns.scenes.scene_tables import (
+    Generator,
+    Table,
+    each_thruster,
+    horizontal,
+    scenario_table,
+    sphere_table,
+    thruster_lags,
+)  # fmt: skip
 from cosim.campaigns.scenes.trials import hard_region, obstacle
 from cosim.precheck.path_search import find_path
 from cosim.precheck.thrust_margin import held_wrench, least_margins
@@ -44,9 +52,13 @@ def make_mismatch(seed: int) -> Table:
     band = {"type": "depth_band", "depth": sum(_DEPTHS) / 2.0, "tolerance": (_DEPTHS[1] - _DEPTHS[0]) / 2.0}
     regions = [hard_region(f"obstacle {i + 1}", obstacle(rng)) for i in range(int(rng.integers(4, 9)))]
     net = _NET_WEIGHT * vehicle.weight * rng.uniform(-1.0, 1.0)
-    parameters = {"seed": seed % 2**31, "buoyancy": float(vehicle.weight - net), **_lags(vehicle, 0.0)}
+    parameters = {
+        "seed": seed % 2**31,
+        "buoyancy": float(vehicle.weight - net),
+        **thruster_lags(vehicle, vehicle.thrust_time_constant),
+    }
     if "bluerov2" in vehicle.name:
-        parameters |= _lags(vehicle, _LAG)
+        parameters |= thruster_lags(vehicle, vehicle.thrust_time_constant + _LAG)
     current = horizontal(rng.uniform(-np.pi, np.pi), rng.uniform(0.0, _CURRENT))
     table = scenario_table(
         f"Mismatch {seed}: {kind}, {vehicle.name}", seed, vehicle, _DURATION, current, parameters, _START.tolist(),
@@ -77,16 +89,6 @@ def is_admitted(scenario: Scenario) -> bool:
     return find_path(regions, scenario.goal_region, start, DeployableGains(), duration).found
 
 
-def _each(vehicle: Vehicle, name: str, values: object) -> dict[str, float]:
-    """Return a parameter of each thruster."""
-    spread = np.broadcast_to(values, vehicle.n_thrusters)  # type: ignore[call-overload]
-    return {f"{name}[{j + 1}]": float(x) for j, x in enumerate(spread)}
-
-
-def _lags(vehicle: Vehicle, more: float) -> dict[str, float]:
-    return _each(vehicle, "thrust_time_constant", vehicle.thrust_time_constant + more)
-
-
 def _drag(rng: Generator, vehicle: Vehicle, parameters: dict[str, float]) -> None:
     """Multiply all damping by 0.5 to 2."""
     _set_damping(vehicle, 2.0 ** rng.uniform(-1.0, 1.0), parameters)
@@ -100,8 +102,8 @@ def _set_damping(vehicle: Vehicle, factor: float, parameters: dict[str, float]) 
 def _limits(rng: Generator, vehicle: Vehicle, parameters: dict[str, float]) -> None:
     """Lower the limits to 0.5 to 1 of the file's, of all thrusters alike or of each."""
     left = rng.uniform(0.5, 1.0) if rng.integers(2) else rng.uniform(0.5, 1.0, vehicle.n_thrusters)
-    parameters |= _each(vehicle, "thrust_min", left * vehicle.thrust_min)
-    parameters |= _each(vehicle, "thrust_max", left * vehicle.thrust_max)
+    parameters |= each_thruster(vehicle, "thrust_min", left * vehicle.thrust_min)
+    parameters |= each_thruster(vehicle, "thrust_max", left * vehicle.thrust_max)
 
 
 def _added_mass(rng: Generator, vehicle: Vehicle, parameters: dict[str, float]) -> None:
@@ -128,12 +130,12 @@ def _set_mass(vehicle: Vehicle, factor: float, parameters: dict[str, float]) -> 
 
 def _dead_band(rng: Generator, vehicle: Vehicle, parameters: dict[str, float]) -> None:
     """Set a dead band of up to 0.15."""
-    parameters |= _each(vehicle, "thrust_dead_band", rng.uniform(0.0, 0.15))
+    parameters |= each_thruster(vehicle, "thrust_dead_band", rng.uniform(0.0, 0.15))
 
 
 def _lag(rng: Generator, vehicle: Vehicle, parameters: dict[str, float]) -> None:
     """Set a lag of up to 0.5 s."""
-    parameters |= _each(vehicle, "thrust_time_constant", rng.uniform(0.0, 0.5))
+    parameters |= thruster_lags(vehicle, rng.uniform(0.0, 0.5))
 
 
 def _gusts(rng: Generator, vehicle: Vehicle, parameters: dict[str, float]) -> None:

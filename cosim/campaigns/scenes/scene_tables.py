@@ -43,9 +43,15 @@ def horizontal(heading: float, speed: float) -> list[float]:
     return [float(speed * np.cos(heading)), float(speed * np.sin(heading)), 0.0]
 
 
-def thruster_lags(vehicle: Vehicle, lag: float) -> dict[str, float]:
-    """Return the parameters for a lag of all thrusters [s]."""
-    return {f"thrust_time_constant[{i + 1}]": lag for i in range(vehicle.n_thrusters)}
+def each_thruster(vehicle: Vehicle, name: str, values: object) -> dict[str, float]:
+    """Return a parameter of each thruster, with one value for all or with one each."""
+    spread = np.broadcast_to(values, vehicle.n_thrusters)  # type: ignore[call-overload]
+    return {f"{name}[{j + 1}]": float(x) for j, x in enumerate(spread)}
+
+
+def thruster_lags(vehicle: Vehicle, lags: object) -> dict[str, float]:
+    """Return the parameters for lags of the thrusters [s]."""
+    return each_thruster(vehicle, "thrust_time_constant", lags)
 
 
 def sphere_table(center: Iterable[float], radius: float) -> Table:

@@ -12,11 +12,12 @@ import numpy as np
 from cosim.campaigns.scenes.scene_tables import (
     Generator,
     Table,
+    each_thruster,
     horizontal,
     scenario_table,
     sphere_table,
     thruster_lags,
-)
+)  # fmt: skip
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
 VEHICLES = ("odin", "bluerov2_heavy", "rexrov")
@@ -80,8 +81,8 @@ def _moments(rng: Generator, vehicle: Vehicle, table: Table) -> None:
 
 def _effectiveness(rng: Generator, vehicle: Vehicle, table: Table) -> None:
     """Set the effectiveness of each thruster to 0.6 to 1."""
-    wear = rng.uniform(0.6, 1.0, vehicle.n_thrusters).tolist()
-    table["plant"]["parameters"] |= {f"thrust_effectiveness[{i + 1}]": x for i, x in enumerate(wear)}
+    wear = rng.uniform(0.6, 1.0, vehicle.n_thrusters)
+    table["plant"]["parameters"] |= each_thruster(vehicle, "thrust_effectiveness", wear)
 
 
 def _lag(rng: Generator, vehicle: Vehicle, table: Table) -> None:

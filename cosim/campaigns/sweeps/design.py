@@ -67,13 +67,6 @@ class Vary:
         """True if all values are whole numbers; False for a range without points."""
         return bool(self.steps) and bool(np.all(np.mod(self.on_grid(np.arange(self.steps)), 1.0) == 0.0))
 
-    def table(self) -> dict[str, Any]:
-        """Return it as a table for JSON."""
-        if self.values:
-            return {"key": self.key, "values": list(self.values)}
-        points = {} if self.points is None else {"points": self.points}
-        return {"key": self.key, "low": self.low, "high": self.high, "log": self.log} | points
-
 
 @dataclass(frozen=True)
 class Design:
@@ -221,7 +214,11 @@ class Design:
 
     def table(self) -> dict[str, Any]:
         """Return it as a table for JSON."""
-        vary = {v.key: {k: x for k, x in v.table().items() if k != "key"} for v in self.vary}
+        vary = {
+            v.key: {"values": list(v.values)} if v.values
+            else {"low": v.low, "high": v.high, "log": v.log} | ({} if v.points is None else {"points": v.points})
+            for v in self.vary
+        }  # fmt: skip
         return {"vary": vary, "design": self.kind, "samples": self.rows, "seed": self.seed}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import secrets
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -138,8 +137,4 @@ def _files(scenario: Scenario) -> dict[str, bytes]:
 
 def _for_json(value: Any) -> Any:
     """Convert a table of a scenario for JSON, with texts for NaN and infinity."""
-    if isinstance(value, dict):
-        return {key: _for_json(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_for_json(item) for item in value]
-    return repr(value) if isinstance(value, float) and not math.isfinite(value) else json.loads(json.dumps(value))
+    return json.loads(json.dumps(value), parse_constant=lambda text: repr(float(text)))

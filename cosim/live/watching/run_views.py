@@ -51,7 +51,7 @@ class _Region(msgspec.Struct):
     criterion: str | None
     keep: str
     unit: str
-    comes: bool
+    is_dynamic: bool
 
 
 class _Rule(msgspec.Struct):

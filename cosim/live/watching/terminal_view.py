@@ -101,7 +101,7 @@ def _regions(snapshot: Snapshot) -> Iterator[tuple[str, str, str]]:
     """Yield name, clearance and style of the regions: the goal, the active one, and the others from the nearest."""
     regions = []
     for i, region in enumerate(snapshot.header["regions"]):
-        is_absent = region["comes"] and not any(snapshot[f"{region['name']}.shift.{axis}"] for axis in "xyz")
+        is_absent = region["is_dynamic"] and not any(snapshot[f"{region['name']}.shift.{axis}"] for axis in "xyz")
         if not is_absent:
             clearance, is_active = snapshot[f"{region['name']}.clearance"], i == snapshot["active"]
             regions.append((i != 0, not is_active, clearance, region))

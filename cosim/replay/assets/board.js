@@ -10,7 +10,7 @@ class Board {
     this.charts = [];
     this.window = null; // null for the whole run
     // hidden until the reader selects them
-    this._out = new Set(["memberships", "asked", "acting", "moments", "turning"]);
+    this._out = new Set(["memberships", "commanded", "acting", "moments", "turning"]);
     this._updated = 0;
     this._pending = 0;
     this._watcher = new IntersectionObserver((entries) => {

@@ -83,14 +83,14 @@ class CommandPanel extends FieldPanel {
   }
 
   _row(index) {
-    const { comes, name: regionName } = this.run.header.regions[index];
+    const { is_dynamic: isDynamic, name: regionName } = this.run.header.regions[index];
     const name = index === 0 ? "target" : regionName;
     const fields = DIRECTIONS.map(([letter, direction], axis) => {
       const props = { disabled: axis < 2 && isFlat(this.run, index), onchange: () => this._moved(row) };
       return numberField(letter, `${name}, ${direction} in meters`, 0.1, props);
     });
     const set = fieldSet(name, ...fields.map(([label]) => label));
-    if (comes) set.append(h("button.gone", { onclick: () => this._forget(index) }, "Remove"));
+    if (isDynamic) set.append(h("button.gone", { onclick: () => this._forget(index) }, "Remove"));
     const row = { index, set, fields: fields.map(([, field]) => field) };
     return row;
   }

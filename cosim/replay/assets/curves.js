@@ -35,9 +35,9 @@ function inTurn(names, labels) {
 }
 
 /** Return a function from run to clearances of a region; NaN while a temporary obstacle is absent. */
-const clearanceOf = ({ name, comes }) => (run) => {
+const clearanceOf = ({ name, is_dynamic: isDynamic }) => (run) => {
   const values = run.column(`${name}.clearance`);
-  if (!values || !comes) return values;
+  if (!values || !isDynamic) return values;
   const shifts = run.columns(`${name}.shift`);
   return values.map((value, row) => (shifts.some((shift) => shift[row] !== 0) ? value : NaN));
 };
@@ -48,7 +48,7 @@ function clearances(runs, unit) {
   for (const run of runs) {
     for (const region of run.header.regions.filter((one) => one.unit === unit)) {
       const values = clearanceOf(region)(run);
-      if (!values || (region.comes && !values.some(Number.isFinite))) continue; // no value so far: not added yet
+      if (!values || (region.is_dynamic && !values.some(Number.isFinite))) continue; // no value so far: not added yet
       const before = byName.get(region.name)?.least ?? Infinity;
       byName.set(region.name, { region, least: values.reduce((a, b) => (b < a ? b : a), before) });
     }
@@ -103,11 +103,11 @@ function chartsOf(runs) {
     ["weights", "Weights of the arbiter", "", criteria("weight"), { fixed: [0, 1] }],
     ["memberships", "Attention that each criterion asks", "", criteria("membership"), { fixed: [0, 1] }],
     ["forces", "Force, size", "N", [
-      size("command", "asked", "vermillion", []), size("actuation", "acts", "blue", [6, 3]),
+      size("command", "commanded", "vermillion", []), size("actuation", "acts", "blue", [6, 3]),
     ]],
-    ["asked", "Force asked, body frame", "N", axes("command", "XYZ")],
+    ["commanded", "Commanded force, body frame", "N", axes("command", "XYZ")],
     ["acting", "Force that acts, body frame", "N", axes("actuation", "XYZ")],
-    ["moments", "Moment asked, body frame", "N.m", axes("command", "KMN")],
+    ["moments", "Commanded moment, body frame", "N.m", axes("command", "KMN")],
     ["turning", "Moment that acts, body frame", "N.m", axes("actuation", "KMN")],
     ["thrusters", "Force of each thruster", "N", thrusters],
     ["estimate", "Estimate of φ1, weight less buoyancy", "N", estimates([0])],
@@ -116,7 +116,7 @@ function chartsOf(runs) {
     ["speed", "Velocity over ground, body frame", "m/s", axes("velocity", "uvw")],
     ["attitude", "Attitude", "rad", inTurn(angles.map((angle) => `attitude.${angle}`), angles)],
     ["sticks", "Sticks that were sent", "", axes("stick", "XYZKMN"), { fixed: [-1, 1] }],
-    ["targets", "Velocity that was asked for, NED", "m/s", axes("velocity_target", "xyz")],
+    ["targets", "Commanded velocity, NED", "m/s", axes("velocity_target", "xyz")],
     ["ages", "Ages on the autopilot's link", "s", inTurn(ages, ["estimate", "late step", "round trip"])],
     ["states", state, "", [signal("companion.state", "state", "blue")], { fixed: [0, 7] }],
     ["modes", "Mode of the autopilot, its own number", "", [signal("autopilot.mode", "mode", "blue")]],

@@ -84,12 +84,12 @@ class Run {
    * at one of its places.
    */
   shift(region, t, place = null) {
-    const { name, comes, places } = this.header.regions[region];
+    const { name, is_dynamic: isDynamic, places } = this.header.regions[region];
     if (places) return places[place ?? this.goalPlace(t)];
     if (!this.has(`${name}.shift.x`)) return [0, 0, 0];
     // do not interpolate between the parked position and the scene
     const next = Math.min(this.row(t) + 1, this.rows - 1);
-    const leaps = comes && !(this.there(region, t) && this._isThere(region, next));
+    const leaps = isDynamic && !(this.there(region, t) && this._isThere(region, next));
     return leaps ? this.vectorHeld(`${name}.shift`, t) : this.vectorAt(`${name}.shift`, t);
   }
 
@@ -154,9 +154,9 @@ class Run {
   }
 
   _isThere(region, row) {
-    const { name, comes } = this.header.regions[region];
+    const { name, is_dynamic: isDynamic } = this.header.regions[region];
     // an imported log has no goal, hence no shift of one
-    return !comes || this.columns(`${name}.shift`).some((column) => column && column[row] !== 0);
+    return !isDynamic || this.columns(`${name}.shift`).some((column) => column && column[row] !== 0);
   }
 
   /** Return the row before a time, and the part of the way to the next one. */

@@ -4,9 +4,9 @@
 function showHead(runs, selected) {
   const several = runs.length > 1;
   const names = runNames(runs);
-  const { title, asked = "", verdict } = runs[selected]?.header ?? { title: document.title };
+  const { title, task = "", verdict } = runs[selected]?.header ?? { title: document.title };
   byId("title").textContent = (several ? `${names[selected]}: ` : "") + (title || names[selected]);
-  byId("asked").replaceChildren(asked.length > 170 ? folded(asked) : asked);
+  byId("task").replaceChildren(task.length > 170 ? folded(task) : task);
   Object.assign(byId("verdict"), { className: verdict ? outcome(runs[selected]) : "", textContent: verdict ?? "" });
   const warnings = runs.flatMap((run, i) => troubles(run).map((text) => (several ? `${names[i]}: ${text}` : text)));
   byId("troubles").replaceChildren(...warnings.map((text) => h("li", {}, text)));

@@ -68,7 +68,7 @@ class LiveLink {
     const does = {
       header: () => this._begin(message.run),
       changes: () => this.run.header.changes.push(...message.changes),
-      said: () => this._said(message),
+      message: () => this._showMessage(message),
       end: () => this._end(message),
     };
     does[message.type]?.();
@@ -91,7 +91,7 @@ class LiveLink {
     for (let i = 0; i < numbers.length; i += width) this.run.append(numbers.subarray(i, i + width));
   }
 
-  _said({ kind, text, time }) {
+  _showMessage({ kind, text, time }) {
     if (kind === "command") this.run.header.events.push({ time, kind, text: `Commanded: ${text}` });
     else this.page.say(kind === "refused" ? `Refused: ${text}` : text, kind === "info" ? "info" : "warning");
   }

@@ -166,8 +166,8 @@ class WhatIf {
     if (goal.places) regions[0] = { ...goal, places: goalPlaces(this.flight.data, (key) => this.value(key)) };
     const change = this._change(restoring.key);
     const truth = { ...header.truth, estimate: restoring.truth.map((phi, i) => phi + change * restoring.slopes[i]) };
-    const task = this.changed ? `With ${this.words().join(", ")}.` : header.asked;
-    return { ...header, name: "what if", asked: task, regions, truth, changes: [], gaps: {} };
+    const task = this.changed ? `With ${this.words().join(", ")}.` : header.task;
+    return { ...header, name: "what if", task, regions, truth, changes: [], gaps: {} };
   }
 
   /** Return the changes as texts. */

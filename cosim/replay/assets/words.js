@@ -146,9 +146,9 @@ function numbersAt(run, t) {
     ["Current", current ? currentWords(current) : ""],
     ["Heading", value("attitude.yaw", "rad")],
     ["Roll, pitch", `${value("attitude.roll", "rad")}, ${value("attitude.pitch", "rad")}`],
-    ["Force asked", size("command", "XYZ", "N")],
+    ["Commanded force", size("command", "XYZ", "N")],
     ["Force that acts", size("actuation", "XYZ", "N")],
-    ["Limits", limited ? "cut what is asked" : "not reached"],
+    ["Limits", limited ? "clip the command" : "not reached"],
   ];
 }
 

@@ -63,7 +63,7 @@ class Viewer:
         return [text for text in self.texts if text["type"] == kind]
 
     def texts_of(self, kind):
-        return [text["text"] for text in self.messages_of("said") if text["kind"] == kind]
+        return [text["text"] for text in self.messages_of("message") if text["kind"] == kind]
 
     def column(self, name):
         names = [signal["name"] for signal in self.headers[-1]["signals"]]

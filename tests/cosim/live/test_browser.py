@@ -117,13 +117,13 @@ def test_keep_in_region_is_dragged_by_its_label(browser, live):
 def test_page_lists_regions_and_moving_regions(browser, live):
     running = live("moving-obstacle", "time.duration=4", commands=True, await_arm=False, rate=1.0)
     open_page(browser, running, "subreach.runs[0]?.rows > 20")
-    names = "return subreach.runs[0].header.regions.map(({ name, comes }) => [name, comes])"
+    names = "return subreach.runs[0].header.regions.map(({ name, is_dynamic }) => [name, is_dynamic])"
     regions = browser.execute_script(names)
-    assert sum(comes for _, comes in regions) > 0
+    assert sum(is_dynamic for _, is_dynamic in regions) > 0
     told = browser.execute_script(
         "return subreach.charts.find(({ spec }) => spec.key === 'distances').legend.textContent"
     )
-    assert "farther" not in told and not [name for name, comes in regions if comes and name in told]
+    assert "farther" not in told and not [name for name, is_dynamic in regions if is_dynamic and name in told]
     moving = browser.execute_script(
         "const r = subreach.runs[0]; return r.header.regions.map((_, i) => r.moves(i, r.end))"
     )

@@ -83,7 +83,7 @@ def test_malformed_requests_do_not_affect_the_run(live, tmp_path, caplog):
         brief = "", "null", "[]", "{", '{"command":1}', '"arm"', '{"command":"arm","armed":1e999}'
         for bad in (b"\x00" * 100, *brief, *deep, number):
             viewer.socket.send(bad)
-            viewer.until("said")
+            viewer.until("message")
         assert len(viewer.texts_of("refused")) == 11
         assert all(said.isprintable() and len(said) < 300 for said in viewer.texts_of("refused"))
     with connect(url) as client:  # D4: a text that is no UTF-8, by which WebSocket has a connection fail

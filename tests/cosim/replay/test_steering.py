@@ -39,7 +39,7 @@ def test_page_shapes_reproduce_recorded_clearances(steered):
         times = sorted({0.0, *(c["time"] for c in header["changes"] if c["region"] == index)})
         for begin, end in zip(times, [*times[1:], np.inf], strict=True):
             rows = (time >= begin) & (time < end)
-            if region["comes"]:
+            if region["is_dynamic"]:
                 rows &= record.stack([f"{name}.shift.{axis}" for axis in "xyz"]).any(axis=1)
             shape = Region(name, shape_at(header, index, begin), region["keep"])
             found = clearances_at(points[rows], shape)

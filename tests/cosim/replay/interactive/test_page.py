@@ -167,7 +167,7 @@ def test_page_is_operable_by_keyboard(browser, page):
     field.send_keys(Keys.ARROW_UP, Keys.ARROW_UP)
     browser.wait_until(FLOWN)
     assert dict(browser.js("return [...subreach.whatIf.values]")) == {"plant.current.1": pytest.approx(0.2)}
-    assert "current y 0.2 m/s" in browser.js("return document.getElementById('asked').textContent")
+    assert "current y 0.2 m/s" in browser.js("return document.getElementById('task').textContent")
     choice = browser.driver.find_element("css selector", "[aria-label='thruster that fails']")
     browser.js("subreach.whatIf.took = null")
     choice.send_keys("thruster 3")
