@@ -13,21 +13,19 @@ from cosim.campaigns.scenes.conflicts import CONFLICTS, draw_conflict
 from cosim.campaigns.scenes.generator import MAX_OBSTACLES, draw_scene
 
 FAMILIES = (*MAX_OBSTACLES, *CONFLICTS)
-_CHANCES = 2**31  # number of seeds of noise, and of obstacles that are drawn again
-_CONFLICTS = 64  # number of conflicts that are drawn to find the number of their coordinates
-_OBSTACLE_COORDINATES = (
-    5  # coordinates of an obstacle: radius, position along the straight line, three of its offset from it
-)
+_N_SEEDS = 2**31  # number of seeds of noise, and of obstacles that are drawn again
+_TRIAL_DRAWS = 64  # number of conflicts that are drawn to find the number of their coordinates
+_OBSTACLE_COORDINATES = 5  # radius, position along the straight line, and three of the offset from it
 _FINITE = 38.5  # standard deviations, beyond all quantiles of floats between 0 and 1; those of 0 and 1 are infinite
 
 Point = NDArray[np.float64]  # (dimension,) coordinates from 0 to 1
 
 
-class Shares:
-    """Replacement of a random number generator: each number is a given quantile of its distribution; shares (n,)."""
+class QuantileGenerator:
+    """Replacement of a random number generator: each number is a given quantile of its distribution; quantiles (n,)."""
 
-    def __init__(self, shares: Point, rest: np.random.Generator, limit: float = _FINITE) -> None:
-        self._shares, self._rest, self._limit = shares, rest, limit
+    def __init__(self, quantiles: Point, fallback: np.random.Generator, limit: float = _FINITE) -> None:
+        self._quantiles, self._fallback, self._limit = quantiles, fallback, limit
         self.drawn = 0  # count of numbers drawn so far
 
     def uniform(self, low: Any = 0.0, high: Any = 1.0, size: int | None = None) -> Any:
@@ -57,9 +55,9 @@ class Shares:
 
     def _next(self, shape: tuple[int, ...]) -> Any:
         n = int(np.prod(shape))
-        given = self._shares[self.drawn : self.drawn + n]
+        given = self._quantiles[self.drawn : self.drawn + n]
         self.drawn += n
-        return np.concatenate([given, self._rest.random(n - len(given))]).reshape(shape)[()]
+        return np.concatenate([given, self._fallback.random(n - len(given))]).reshape(shape)[()]
 
 
 class SceneSpace:
@@ -70,36 +68,37 @@ class SceneSpace:
 
     def __init__(self, family: str, limit: float | None = None) -> None:
         self.family, self._limit = family, _FINITE if limit is None else limit
-        self._chance_in_point = limit is None
+        self._seed_in_point = limit is None
         rng = np.random.default_rng(0)
         if family in MAX_OBSTACLES:
-            several = [Shares(np.empty(0), rng)]
-            draw_scene(several[0], [Shares(np.empty(0), rng)] * MAX_OBSTACLES[family], 0, family)
+            generators = [QuantileGenerator(np.empty(0), rng)]
+            draw_scene(generators[0], [QuantileGenerator(np.empty(0), rng)] * MAX_OBSTACLES[family], 0, family)
         else:
-            several = [Shares(np.empty(0), rng) for _ in range(_CONFLICTS)]
-            for shares in several:
-                draw_conflict(shares, 0, family)
-        self._others = max(shares.drawn for shares in several)
-        self._of_obstacles = _OBSTACLE_COORDINATES * MAX_OBSTACLES.get(family, 0)
-        self.dimension = self._others + self._of_obstacles + self._chance_in_point
+            generators = [QuantileGenerator(np.empty(0), rng) for _ in range(_TRIAL_DRAWS)]
+            for generator in generators:
+                draw_conflict(generator, 0, family)
+        self._n_other = max(generator.drawn for generator in generators)
+        self._n_of_obstacles = _OBSTACLE_COORDINATES * MAX_OBSTACLES.get(family, 0)
+        self.dimension = self._n_other + self._n_of_obstacles + self._seed_in_point
 
     def line(self, point: Point, seed: int) -> bytes:
         """Return the scene at a point as a line of JSON; point (dimension,)."""
-        chance = int(point[-1] * _CHANCES) if self._chance_in_point else seed
-        rest = np.random.default_rng([chance, 2])
-        others = Shares(point[: self._others], rest, self._limit)
+        noise_seed = int(point[-1] * _N_SEEDS) if self._seed_in_point else seed
+        fallback = np.random.default_rng([noise_seed, 2])
+        others = QuantileGenerator(point[: self._n_other], fallback, self._limit)
         if self.family in MAX_OBSTACLES:
-            obstacles = point[self._others : self._others + self._of_obstacles].reshape(-1, _OBSTACLE_COORDINATES)
+            obstacles = point[self._n_other : self._n_other + self._n_of_obstacles].reshape(-1, _OBSTACLE_COORDINATES)
             # one generator per obstacle: redrawing one does not change another
-            again = [
-                np.random.default_rng([chance, 2, i]) if self._chance_in_point else rest for i in range(len(obstacles))
+            fallbacks = [
+                np.random.default_rng([noise_seed, 2, i]) if self._seed_in_point else fallback
+                for i in range(len(obstacles))
             ]
-            drawn = [Shares(shares, of, self._limit) for shares, of in zip(obstacles, again, strict=True)]
+            drawn = [QuantileGenerator(*pair, self._limit) for pair in zip(obstacles, fallbacks, strict=True)]
             scene = draw_scene(others, drawn, seed, self.family)
-            if self._chance_in_point:
-                scene["noise"]["seed"] = chance
+            if self._seed_in_point:
+                scene["noise"]["seed"] = noise_seed
         else:
             scene = draw_conflict(others, seed, self.family)
-            if self._chance_in_point:
-                scene["scenario"]["sensing"]["seed"] = chance
+            if self._seed_in_point:
+                scene["scenario"]["sensing"]["seed"] = noise_seed
         return json.dumps(scene).encode() + b"\n"

@@ -48,19 +48,19 @@ def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: 
     n = max(MIN_BUDGET // 5, budget // _PARTICLES)
     z = rng.standard_normal((n, dimension))
     costs, families = evaluate(ndtr(z)), np.arange(n)
-    left, step, reached, variance, bound = budget - n, 0.5, 1.0, 0.0, 1.0
+    remaining, step, reached, variance, bound = budget - n, 0.5, 1.0, 0.0, 1.0
     levels: list[tuple[float, float]] = []
     while True:
         level = float(np.sort(costs)[int(_KEPT * n) - 1])
         inside = costs <= level
         copied = np.flatnonzero(~inside)
-        several = len(np.unique(families))
-        if level < 0.0 or not len(copied) or left < _MOVES * len(copied):
+        n_families = len(np.unique(families))
+        if level < 0.0 or not len(copied) or remaining < _MOVES * len(copied):
             break
         variance += _relative_variance(inside, families)
         reached *= float(inside.mean())
         levels.append((level, reached))
-        bound = min(bound, reached * _factor(variance, several))
+        bound = min(bound, reached * _factor(variance, n_families))
         parents = np.arange(n)
         parents[copied] = rng.choice(np.flatnonzero(inside), len(copied))
         z, costs, families = z[parents], costs[parents], families[parents]
@@ -68,28 +68,28 @@ def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: 
             proposals = math.sqrt(1.0 - step**2) * z[copied] + step * rng.standard_normal((len(copied), dimension))
             proposals = np.where(rng.random(proposals.shape) < _CHANGED, proposals, z[copied])
             new = evaluate(ndtr(proposals))
-            left -= len(copied)
+            remaining -= len(copied)
             accepted = new <= level
             z[copied[accepted]], costs[copied[accepted]] = proposals[accepted], new[accepted]
             step = float(np.clip(step * math.exp(_GAIN * (accepted.mean() - _ACCEPTED)), _SHORTEST, 1.0))
     event = costs < 0.0
     if not event.any():
-        none = 1.0 - _TAIL ** (1.0 / several)  # Clopper and Pearson, none of `several` families
-        bound = min(bound, reached * _factor(variance, several) * none)
-        return Estimate(0.0, 0.0, bound, tuple(levels), several)
+        upper = 1.0 - _TAIL ** (1.0 / n_families)  # Clopper and Pearson, none of `n_families` families
+        bound = min(bound, reached * _factor(variance, n_families) * upper)
+        return Estimate(0.0, 0.0, bound, tuple(levels), n_families)
     probability = reached * float(event.mean())
-    factor = _factor(variance + _relative_variance(event, families), several)
+    factor = _factor(variance + _relative_variance(event, families), n_families)
     levels.append((0.0, probability))
-    return Estimate(probability, probability / factor, min(1.0, probability * factor), tuple(levels), several)
+    return Estimate(probability, probability / factor, min(1.0, probability * factor), tuple(levels), n_families)
 
 
-def _factor(variance: float, several: int) -> float:
+def _factor(variance: float, n_families: int) -> float:
     """Return the factor of the interval about a probability, from its relative variance and number of families."""
-    return math.exp(float(t.ppf(1.0 - _TAIL, several - 1)) * math.sqrt(variance)) if several > 1 else math.inf
+    return math.exp(float(t.ppf(1.0 - _TAIL, n_families - 1)) * math.sqrt(variance)) if n_families > 1 else math.inf
 
 
 def _relative_variance(inside: NDArray[np.bool_], families: NDArray[np.int64]) -> float:
     """Return the squared relative error of a fraction, between independent families."""
-    fraction, several = inside.mean(), len(np.unique(families))
+    fraction, n_families = inside.mean(), len(np.unique(families))
     sums = np.bincount(families, inside - fraction)
-    return float((sums**2).sum() / inside.sum() ** 2 * several / max(1, several - 1))
+    return float((sums**2).sum() / inside.sum() ** 2 * n_families / max(1, n_families - 1))

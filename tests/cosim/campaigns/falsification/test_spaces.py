@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import ks_2samp
 
 from controller import LAWS
-from cosim.campaigns.falsification.spaces import SceneSpace, Shares
+from cosim.campaigns.falsification.spaces import QuantileGenerator, SceneSpace
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.conflicts import CONFLICTS, make_conflict
@@ -67,7 +67,7 @@ def test_no_point_leaves_the_family(kind):
 
 def test_sampling_with_replacement_is_rejected():
     with pytest.raises(NotImplementedError):
-        Shares(np.empty(0), np.random.default_rng(0)).choice(3, 2, replace=True)
+        QuantileGenerator(np.empty(0), np.random.default_rng(0)).choice(3, 2, replace=True)
 
 
 def test_redrawn_obstacle_leaves_others_unchanged():
