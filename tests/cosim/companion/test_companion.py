@@ -1,5 +1,6 @@
 """The companion flies our own vehicle through its autopilot, whose clock is the run's; nothing here waits."""
 
+import gc
 import math
 import re
 from concurrent.futures import ThreadPoolExecutor
@@ -226,6 +227,14 @@ def test_a_global_origin_is_sent_each_second_until_the_autopilot_has_one(tmp_pat
     without = StandIn(profile="generic", shift=SHIFT)
     Flight(tmp_path / "without", 0.5, link=without, origin=SceneOrigin(surveyed=(0.0, 0.0, 0.0)))
     assert not without.of_type("SET_GPS_GLOBAL_ORIGIN")
+
+
+@pytest.mark.medium
+def test_garbage_collection_leaves_out_what_was_there_before_steering(tmp_path):
+    link, frozen = StandIn(profile="generic", shift=SHIFT), []
+    link.events = [(1.0, lambda: frozen.append(gc.get_freeze_count()))]
+    assert Flight(tmp_path, 1.5, link=link).status == "completed"
+    assert frozen[0] > 10_000 and gc.get_freeze_count() == 0
 
 
 @pytest.mark.medium
