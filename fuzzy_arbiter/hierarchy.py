@@ -12,14 +12,13 @@ from fuzzy_arbiter.definition import Normalization, Output, Outside, System, Var
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import And, Is, Or, Proposition
 from fuzzy_arbiter.rule import Rule
-from fuzzy_arbiter.shapes import Shape, falling, rising
+from fuzzy_arbiter.shapes import DEGREE, Shape, falling, rising
 from fuzzy_arbiter.terms.term import Term
 
 Form = Literal["hierarchical", "minimal", "conjunctive", "complete"]
 FORMS: tuple[str, ...] = get_args(Form)
 MAX_COMPLETE = 16  # maximum number of criteria in the complete form, which then has a million rules
 
-DEGREE = rising(0.0, 1.0)
 # the pair of section VI: low is the triangle (0, 0, 1), high the triangle (0, 1, 1)
 WEIGHT = Output("alpha", (0.0, 1.0), (Term("low", falling(0.0, 1.0)), Term("high", rising(0.0, 1.0))))
 

@@ -262,3 +262,6 @@ def falling(start: float, end: float) -> Shape:
     0.75
     """
     return Shape(((start, 1.0), (end, 0.0)))
+
+
+DEGREE = rising(0.0, 1.0)  # of an input that is a degree itself

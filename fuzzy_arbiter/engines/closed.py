@@ -1,7 +1,7 @@
 """The closed form: exact, and thousands of times faster than sampling."""
 
-# If the cuts of an output's two terms are 1 - h and h for all inputs, its centroid is a function C(h) alone, piecewise
-# cubic over quadratic. For prioritized criteria, with m the degree to which each asks for attention,
+# If the cuts of an output's two terms are 1 - h and h for all inputs, its centroid is a function C(h) alone. For
+# prioritized criteria, with m the degree to which each asks for attention,
 #
 #     h_k = min(1 - m_1, 1 - m_2 ... 1 - m_(k-1), m_k),
 #
@@ -9,7 +9,7 @@
 #
 #     C(h) = 1/3 + h^2 - 2/3 h^3,
 #
-# which scaled to [0, 1] is the smoothstep 3 h^2 - 2 h^3.
+# which scaled to [0, 1] is the smoothstep 3 h^2 - 2 h^3. Other terms are integrated, cut at 1 - h and h.
 
 from __future__ import annotations
 
@@ -21,28 +21,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
-from fuzzy_arbiter.engines.engine import Defuzzifier, Engine, Shortcut
+from fuzzy_arbiter.engines.clipped_centroid_batch import Centroid
+from fuzzy_arbiter.engines.engine import Engine, Shortcut
 from fuzzy_arbiter.engines.normal_form import Literal, NoClosedFormError, high_clauses, ladder
-from fuzzy_arbiter.engines.rational_pieces import Piece, evaluate, pieces
 from fuzzy_arbiter.engines.supported import unsupported_reason
-from fuzzy_arbiter.hierarchy import DEGREE
-from fuzzy_arbiter.shapes import Array
+from fuzzy_arbiter.shapes import DEGREE, Array, falling, rising
 
-SMOOTHSTEP = (3.0, -2.0)  # coefficients of 3 h^2 - 2 h^3, which stays within [0, 1]
 _BLOCK = 8192  # number of samples evaluated at a time; longer arrays leave the caches and are allocated anew each time
-
-
-class _ClosedForm(Defuzzifier):
-    """C(h) of one output, whose cuts are 1 - h and h."""
-
-    method = "closed form"
-
-    def __init__(self, forms: tuple[Piece, ...]) -> None:
-        self._forms = forms
-
-    def value(self, cuts: Sequence[float], inputs: Sequence[float]) -> float:
-        """Return the value for one sample."""
-        return float(evaluate(self._forms, cuts[1]))
 
 
 class ClosedEngine(Engine):
@@ -54,9 +39,11 @@ class ClosedEngine(Engine):
         _require_closed(system)
         self.clauses = high_clauses(system)
         self.ladder = ladder(system, self.clauses)
-        self.raw, scaled = _pieces(system.outputs)
-        self.scaled = self.raw if system.normalization == "none" else scaled
-        super().__init__(system, [_ClosedForm(forms) for forms in self.raw])
+        patterns = [replace(output, name="any") for output in system.outputs]
+        known = {pattern: Centroid(pattern, scales=False) for pattern in dict.fromkeys(patterns)}
+        super().__init__(system, [known[pattern] for pattern in patterns])
+        self.smooth = all(map(is_smooth, system.outputs))
+        self.is_smoothstep = self.smooth and system.normalization != "none"
         # index of each literal's input, and its term's membership function; None where the input is the degree itself
         self._sources = {
             (v.name, t.name, affirmed): (i, None if (v.universe, t.shape) == ((0.0, 1.0), DEGREE) else t.membership)
@@ -64,52 +51,55 @@ class ClosedEngine(Engine):
             for t in v.terms
             for affirmed in (True, False)
         }
-        self._smooth = _smooth_cubic(self.scaled)
-        # true if such weights are then clipped to [0, 1]: between h = 0 and 1 a C(h) may lie beyond C(0) and C(1)
-        self.clips = system.normalization != "none" and self._smooth != SMOOTHSTEP
 
     def centroids(self, inputs: Sequence[float]) -> list[float]:
         """Return the raw value of each output for one sample; see `Engine`."""
-        return [evaluate(forms, h) for forms, h in zip(self.raw, self._highs(inputs), strict=True)]
+        return [self._centroid(k, h) for k, h in enumerate(self._highs(inputs))]
 
     def centroids_of_many(self, inputs: Array) -> Array:
         """Return the raw value of each output for many samples; see `Engine`."""
-        return np.stack([evaluate(forms, h) for forms, h in zip(self.raw, self._highs(inputs), strict=True)], axis=1)
+        return np.stack([self._centroid(k, h) for k, h in enumerate(self._highs(inputs))], axis=1)
+
+    def _centroid(self, k: int, h: Any) -> Any:
+        """Return C(h) of the k-th output for a number or an array."""
+        if self.smooth:
+            low, high = self.system.outputs[k].universe
+            return low + (high - low) * (1.0 / 3.0 + h * (h * (1.0 + h * (-2.0 / 3.0))))
+        centroid = self.defuzzifiers[k]
+        return (
+            centroid.values(np.array([1.0 - h, h]), h)
+            if isinstance(h, np.ndarray)
+            else centroid.value((1.0 - h, h), ())
+        )
 
     def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
         """Return the normalized value of each output for one sample; see `Engine`."""
-        result = [evaluate(forms, h) for forms, h in zip(self.scaled, self._highs(inputs), strict=True)]
-        return self.normalized([min(max(weight, 0.0), 1.0) for weight in result] if self.clips else result)
+        if not self.is_smoothstep:
+            return super().weights(inputs)
+        return self.normalized([h * (h * (3.0 + h * -2.0)) for h in self._highs(inputs)])
 
     def weights_of_many(self, inputs: Array) -> Array:
         """Return the normalized value of each output for many samples; see `Engine`."""
+        if not self.is_smoothstep:
+            return super().weights_of_many(inputs)
         result = np.empty((len(inputs), len(self.system.outputs)))
         for start in range(0, len(inputs), _BLOCK):
             highs = self._highs(inputs[start : start + _BLOCK])
             values = np.empty((len(highs), len(highs[0])))
-            for row, h, forms in zip(values, highs, self.scaled, strict=True):
-                if self._smooth:  # in place, one row after the other: three times as fast
-                    np.multiply(h, self._smooth[1], out=row)
-                    row += self._smooth[0]
-                    row *= h
-                    row *= h
-                else:
-                    row[:] = evaluate(forms, h)
+            for row, h in zip(values, highs, strict=True):  # in place, one row after the other: three times as fast
+                np.multiply(h, -2.0, out=row)
+                row += 3.0
+                row *= h
+                row *= h
             result[start : start + _BLOCK] = values.T
-        if self.clips:
-            np.clip(result, 0.0, 1.0, out=result)
         return self.normalized_of_many(result)
 
     def shortcut(self) -> Shortcut | None:
         """Return a faster function for the weights where the inputs are the criteria's degrees; see `Engine`."""
         steps = [(*self._sources[step], step[2]) for step in self.ladder or ()]
         plain = steps == [(i, None, True) for i in range(len(self.system.inputs))]  # in the order of the inputs
-        has_steps_after = self.clips or self.system.normalization not in (
-            "range",
-            "none",
-        )  # more to be done with the weights
-        if plain and not has_steps_after and self._smooth:
-            return _smooth_ladder(len(self.system.inputs), *self._smooth)
+        if plain and self.is_smoothstep and self.system.normalization == "range":
+            return _smooth_ladder(len(self.system.inputs))
         return None
 
     def _highs(self, inputs: Any) -> list[Any]:
@@ -153,24 +143,13 @@ def _require_closed(system: System) -> None:
         raise NoClosedFormError(reason)
 
 
-def _pieces(outputs: Sequence[Output]) -> tuple[tuple[tuple[Piece, ...], ...], tuple[tuple[Piece, ...], ...]]:
-    """Return C(h) of each output, raw and scaled, computed once for outputs that differ in name alone."""
-    patterns = [replace(output, name="any") for output in outputs]
-    known = {pattern: pieces(pattern) for pattern in dict.fromkeys(patterns)}
-    return tuple(known[pattern][0] for pattern in patterns), tuple(known[pattern][1] for pattern in patterns)
+def is_smooth(output: Output) -> bool:
+    """Return True for the pair of triangles over the universe whose C(h) is a smoothstep."""
+    return tuple(term.shape for term in output.terms) == (falling(*output.universe), rising(*output.universe))
 
 
-def _smooth_cubic(forms: Sequence[tuple[Piece, ...]]) -> tuple[float, float] | None:
-    """Return n2 and n3 if each output is (n2 + n3 h) h^2."""
-    first = forms[0][0] if forms[0] else None
-    if first is None or len(set(forms)) > 1 or len(forms[0]) > 1:
-        return None
-    smooth = first.numerator[:2] == (0.0, 0.0) and first.denominator == (1.0, 0.0, 0.0)
-    return first.numerator[2:] if smooth else None
-
-
-def _smooth_ladder(n: int, n2: float, n3: float) -> Shortcut:
-    """Return a function from the n degrees m to the n weights (n2 + n3 h) h^2; it returns None for invalid degrees."""
+def _smooth_ladder(n: int) -> Shortcut:
+    """Return a function from the n degrees m to the n weights 3 h^2 - 2 h^3; it returns None for invalid degrees."""
 
     def weights(degrees: Sequence[float]) -> list[float] | None:
         if len(degrees) != n:
@@ -181,7 +160,7 @@ def _smooth_ladder(n: int, n2: float, n3: float) -> Shortcut:
             if (type(m) is not float and type(m) is not int) or not 0.0 <= m <= 1.0:
                 return None
             h = m if m < unclaimed else unclaimed
-            result.append((n2 + n3 * h) * h * h)
+            result.append((3.0 - 2.0 * h) * h * h)
             if 1.0 - m < unclaimed:
                 unclaimed = 1.0 - m
         return result

@@ -18,7 +18,6 @@ from fuzzy_arbiter.engines.engine import Engine
 from fuzzy_arbiter.engines.firing import Logic, Slot
 from fuzzy_arbiter.engines.panels import halved, smooth_panels
 from fuzzy_arbiter.engines.quadrature import Quadrature
-from fuzzy_arbiter.engines.rational_pieces import Piece
 from fuzzy_arbiter.errors import DefinitionError, UnsupportedError
 from fuzzy_arbiter.export.code_functions import called
 from fuzzy_arbiter.export.statements import (
@@ -79,9 +78,9 @@ def program(system: System) -> Program:
             what = f"output {output.name!r} keeps its previous value"
             raise UnsupportedError(f"export: {what}, which a function of one sample has not")
     engine, _ = choose(system, "auto")
-    closed = isinstance(engine, ClosedEngine)
     statements = (*_inputs(system), *(_closed(engine) if isinstance(engine, ClosedEngine) else _swept(engine)))
-    pairs = [] if closed else list(zip(system.outputs, engine.defuzzifiers, strict=True))
+    smooth = isinstance(engine, ClosedEngine) and engine.smooth
+    pairs = [] if smooth else list(zip(system.outputs, engine.defuzzifiers, strict=True))
     outlines = tuple(outline(output) if isinstance(one, Centroid) else None for output, one in pairs)
     heights = tuple(
         _heights(output, slots) if isinstance(one, ClippedCurves | Quadrature) and slots else None
@@ -162,32 +161,26 @@ def _closed(engine: ClosedEngine) -> Iterator[Statement]:
             values.append(Assign(unclaimed, free, "no criterion so far asks"))
     yield from degrees.statements
     yield from values
-    for k, (output, forms) in enumerate(zip(engine.system.outputs, engine.scaled, strict=True), 1):
-        ends = [*(f"h{k} < {piece.start!r}" for piece in forms[1:]), ""]
-        values_of_h = [_piece(piece, f"h{k}") for piece in forms]
-        yield from assign_first(f"y{k}", list(zip(ends, values_of_h, strict=True)), output.name)
-        if engine.clips:
-            yield Assign(f"y{k}", f"least(greatest(y{k}, 0.0), 1.0)")
+    for k, output in enumerate(engine.system.outputs, 1):
+        (low, top), h = output.universe, f"h{k}"
+        if engine.is_smoothstep:
+            yield Assign(f"y{k}", f"{h} * ({h} * (3.0 + {h} * -2.0))", output.name)
+            continue
+        if engine.smooth:
+            smooth = f"{1.0 / 3.0!r} + {h} * ({h} * (1.0 + {h} * {-2.0 / 3.0!r}))"
+            yield Assign(
+                f"y{k}", smooth if (low, top) == (0.0, 1.0) else f"{low!r} + {top - low!r} * ({smooth})", output.name
+            )
+        else:
+            yield Assign(f"y{k}", "0.0", output.name)
+            yield Sweep(f"y{k}", k, (f"(1.0 - {h})", h), "clipped")
+        yield from _scaled(engine, k)
 
 
 def _literal(literal: tuple[str, str, bool], degrees: _Degrees) -> str:
     variable, term, affirmed = literal
     degree = degrees.name_of(Is(variable, term))
     return degree if affirmed else f"(1.0 - {degree})"
-
-
-def _piece(piece: Piece, h: str) -> str:
-    t = h if piece.start == 0.0 else f"({h} - {piece.start!r})"
-    above = _horner(piece.numerator, t)
-    return above if piece.denominator == (1.0, 0.0, 0.0) else f"({above}) / ({_horner(piece.denominator, t)})"
-
-
-def _horner(coefficients: Sequence[float], t: str) -> str:
-    result = ""
-    for c in reversed(coefficients):
-        product = f"{t} * ({result})" if " + " in result else f"{t} * {result}" if result else ""
-        result = (f"{c!r} + {product}" if c else product) if product else repr(c) if c else ""
-    return result or "0.0"
 
 
 def _swept(engine: Engine) -> Iterator[Statement]:
@@ -246,10 +239,14 @@ def _swept(engine: Engine) -> Iterator[Statement]:
         if output.lock_range:
             low, high = output.universe
             yield Assign(f"y{k}", f"least(greatest(y{k}, {low!r}), {high!r})")
-        if engine.scale:
-            low, high = engine.scale[k - 1]
-            scaled = f"(y{k} - {low!r}) / {high - low!r}"
-            yield Assign(f"y{k}", f"least(greatest({scaled}, 0.0), 1.0)")
+        yield from _scaled(engine, k)
+
+
+def _scaled(engine: Engine, k: int) -> Iterator[Statement]:
+    """Scale the k-th output to its range, if that is the normalization."""
+    if engine.scale:
+        low, high = engine.scale[k - 1]
+        yield Assign(f"y{k}", f"least(greatest((y{k} - {low!r}) / {high - low!r}, 0.0), 1.0)")
 
 
 def _valued(output: Output, k: int, cuts: Sequence[str], system: System) -> tuple[Statement, ...]:

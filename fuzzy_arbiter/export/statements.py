@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from functools import partial, reduce
 from itertools import accumulate
 
-from fuzzy_arbiter.hierarchy import DEGREE
-from fuzzy_arbiter.shapes import Membership, Shape
+from fuzzy_arbiter.shapes import DEGREE, Membership, Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.expressions import code
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS

@@ -243,7 +243,7 @@ def in_python(system, folder):
 
     def evaluate(x):
         try:
-            return 0, module["values"](x)
+            return 0, module["weights" if system.weights_of else "values"](x)
         except ValueError as error:
             (status,) = {status for fault, status in faults.items() if fault in str(error)}
             return status, ()

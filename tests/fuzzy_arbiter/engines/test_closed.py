@@ -1,6 +1,5 @@
 """The closed form against the exact centroid, and the proof of its existence."""
 
-import math
 from dataclasses import replace
 from fractions import Fraction
 
@@ -12,7 +11,6 @@ from hypothesis import strategies as st
 from fuzzy_arbiter import Arbiter, Output, Rule, Shape, System, Term, Variable, falling, rising, triangle
 from fuzzy_arbiter.criteria import Criterion, prioritized
 from fuzzy_arbiter.engines.closed import ClosedEngine
-from fuzzy_arbiter.engines.rational_pieces import pieces
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Or
 from tests.examples import examples
@@ -54,7 +52,7 @@ def test_closed_form_equals_exact_centroid_on_100_000_inputs():
 @pytest.mark.medium
 @settings(max_examples=examples(90), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(shapes(), shapes(), st.floats(0.0, 1.0), st.sampled_from(["none", "range", "sum", "max"]))
-def test_weights_of_any_pair_are_rational(low, high, h, normalization):
+def test_weights_of_any_pair_are_exact(low, high, h, normalization):
     """Between its ends a C(h) may lie beyond them; normalized weights are in [0, 1] even so."""
     output = Output("y", (0, 1), {"low": low, "high": high})
     system = prioritized(criteria(2), weight=output, normalization=normalization)
@@ -111,27 +109,13 @@ PLATEAU = Shape(((0, 1),))
         ),
     ],
 )
-def test_pieces_are_exact_where_the_area_is_small_and_next_to_their_starts(low, high, near):
+def test_weights_are_exact_where_the_area_is_small(low, high, near):
     output = replace(Y, terms=(Term("low", low), Term("high", high)))
     engine = ClosedEngine(prioritized(criteria(1), weight=output, normalization="none"))
     small = [*(near * x for x in (0.1, 0.5, 0.9, 1.0, 1.1, 3.0)), *np.random.default_rng(0).random(20).tolist()]
-    starts = [x for piece in engine.raw[0] for x in (piece.start, math.nextafter(piece.start, 0))]
-    for h in [*small, *(1 - x for x in small), *starts]:
+    for h in [*small, *(1 - x for x in small)]:
         exact = float(reference.centroid(output, [1 - Fraction(h), Fraction(h)]))
         assert engine.weights([h])[0] == pytest.approx(exact, abs=16 * EPS)
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "count"),
-    [
-        (falling(0, 1), rising(0, 1), 1),
-        (falling(0.3, 0.7), rising(0.3, 0.7), 1),
-        (falling(0.2, 0.55), rising(0.37, 0.83), 3),
-    ],
-)
-def test_number_of_cubic_pieces_is_minimal(low, high, count):
-    _, scaled = pieces(Output("y", (0, 1), {"low": low, "high": high}))
-    assert sum(piece.start < 1.0 for piece in scaled) == count  # beside them there may be one for h = 1 alone
 
 
 @pytest.mark.parametrize("n", range(1, 13))
