@@ -3,45 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from fractions import Fraction
-from typing import Literal
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.engines.clipped_centroid import term_centroids
-from fuzzy_arbiter.engines.firing import Firing
-from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
-from fuzzy_arbiter.rule import Rule
-from fuzzy_arbiter.verification.cells import Domain, crisp, graded, rank
+from fuzzy_arbiter.propositions import And, Anything, Is, Not, Or, Proposition
+from fuzzy_arbiter.rule import Operators, Rule
+from fuzzy_arbiter.shapes import Array
+from fuzzy_arbiter.verification.cells import Domain, crisp, graded, ranked
 from fuzzy_arbiter.verification.search import Answer, Goal, Group, Search
 
-Reach = Literal["exact", "bound", "samples"]
-HALF = Fraction(1, 2)
-SUPPORT = (Fraction(0), Fraction(1))
-FIRES, FULLY = rank(Fraction(0), SUPPORT), rank(Fraction(1), SUPPORT) - 1  # ranks to exceed
+SUPPORT = (0.0, 1.0)
+FIRES, FULLY = 1, 2  # ranks to exceed, of the degrees 0, between, and 1
 ANY = 2**30  # number of groups that is never reached, for no upper limit
 SAMPLES = 4096  # maximum number of sampled combinations
-
-
-class Effort:
-    """The statements that searches may evaluate in all; a search leaves its unused part to the next ones."""
-
-    def __init__(self, limit: int, searches: int) -> None:
-        self.limit = limit
-        self._left = limit
-        self._searches = searches
-
-    def share(self) -> int:
-        """Return the number of statements that the next search may evaluate."""
-        share = max(0, self._left) // max(1, self._searches)
-        self._searches -= 1
-        return share
-
-    def use(self, statements: int) -> None:
-        """Subtract the statements that a search has evaluated."""
-        self._left -= statements
+SEARCHES = 8  # which share the effort
+# norms that are above 0 wherever the minimum is, or below 1 wherever the maximum is
+_STRICT = ("min", "prod", "einstein_product", "hamacher_product", "max", "probor", "einstein_sum", "hamacher_sum")
 
 
 def greatest_term(output: Output) -> str:
@@ -50,52 +31,89 @@ def greatest_term(output: Output) -> str:
     return output.term_names[max(range(len(centroids)), key=lambda j: (centroids[j], j))]
 
 
-def rules_on(system: System, statement: Is) -> tuple[Rule, ...]:
-    """Return the rules that conclude a statement."""
-    return tuple(rule for rule in system.rules if statement in rule.conclusions)
+def conditions_on_inputs(system: System) -> list[Proposition]:
+    """Return the conditions of the rules, in which a statement on an output is the conditions of rules before."""
+    result: list[Proposition] = []
+    outputs = {v.name for v in system.outputs}
+    never = Not(Anything(system.inputs[0].name))
+
+    def on_inputs(p: Proposition) -> Proposition:
+        if isinstance(p, Is) and p.variable in outputs:
+            earlier = [own for own, rule in zip(result, system.rules, strict=False) if p in rule.conclusions]
+            return Or(tuple(earlier)) if len(earlier) > 1 else earlier[0] if earlier else never
+        if isinstance(p, And | Or):
+            return type(p)(tuple(map(on_inputs, p.parts)))
+        return replace(p, part=on_inputs(p.inner[0])) if p.inner else p  # type: ignore[type-var]
+
+    for rule in system.rules:
+        result += [on_inputs(rule.condition)]
+    return result
+
+
+def _is_sound(p: Proposition, norms: System | Operators, outputs: Collection[str], above: bool) -> bool:
+    """Return True if a degree is above 0 (or, if not `above`, below 1) just where that under ``min`` and ``max`` is."""
+    if isinstance(p, And | Or):
+        if above == isinstance(p, And) and (norms.conjunction if above else norms.disjunction) not in _STRICT:
+            return False
+    elif isinstance(p, Is):
+        return above or p.variable not in outputs
+    return all(_is_sound(part, norms, outputs, above != isinstance(p, Not)) for part in p.inner)
 
 
 class Questions:
     """Questions on one kind of inputs, crisp rows or graded inputs."""
 
-    def __init__(self, system: System, domains: Sequence[Domain], levels: Sequence[Fraction], effort: Effort) -> None:
-        self._system = system
+    def __init__(self, system: System, domains: Sequence[Domain], levels: Sequence[float], effort: int) -> None:
+        self._system, self._levels, self._effort = system, levels, effort
         self._domains = {domain.variable: domain for domain in domains}
-        self._levels = levels
-        self._effort = effort
+        self._conditions = conditions_on_inputs(system)
 
     @classmethod
-    def of_rows(cls, system: System, effort: Effort) -> Questions:
+    def of_rows(cls, system: System, effort: int) -> Questions:
         """Return the questions on crisp rows."""
-        return cls(system, [crisp(v, SUPPORT) for v in system.inputs], SUPPORT, effort)
+        return cls(system, [crisp(v, SUPPORT) for v in system.inputs if v.terms], SUPPORT, effort)
 
     @classmethod
-    def of_support(cls, system: System, effort: Effort) -> Questions:
-        """Return the questions on rules that fire at all; the answers hold for every *and*, *or* and weight."""
-        return cls(system, [graded(v, SUPPORT) for v in system.inputs], SUPPORT, effort)
+    def of_support(cls, system: System, effort: int) -> Questions:
+        """Return the questions on rules that fire at all."""
+        return cls(system, [graded(v, SUPPORT) for v in system.inputs if v.terms], SUPPORT, effort)
 
     @classmethod
-    def of_halves(cls, system: System, effort: Effort) -> Questions:
+    def of_halves(cls, system: System, effort: int) -> Questions:
         """Return the questions on rules that fire above 1/2; they hold for ``min`` and ``max`` and every weight."""
-        above = {HALF, *(level for rule in system.rules if (level := HALF / Fraction(rule.weight)) < 1)}
-        levels = tuple(sorted(above | {1 - level for level in above}))
+        above = {0.5, *(0.5 / rule.weight for rule in system.rules if rule.weight > 0.5)}
+        levels = sorted(above | {1.0 - level for level in above})
         return cls(system, [graded(v, levels) for v in system.inputs], levels, effort)
+
+    @property
+    def proves(self) -> bool:
+        """True if the answers on support hold for the system's norms, and not only for ``min`` and ``max``."""
+        system = self._system
+        outputs = {v.name for v in system.outputs}
+        return all(_is_sound(rule.condition, rule.operators or system, outputs, True) for rule in system.rules)
+
+    def rules_on(self, statement: Is) -> list[tuple[Rule, Proposition]]:
+        """Return the rules that conclude a statement, with their conditions on inputs."""
+        pairs = zip(self._system.rules, self._conditions, strict=True)
+        return [(rule, condition) for rule, condition in pairs if statement in rule.conclusions]
 
     def firing(self, statement: Is) -> Group:
         """Return the group of rules that conclude a statement at any strength."""
-        return tuple((rule.condition, FIRES) for rule in rules_on(self._system, statement))
+        return tuple((condition, FIRES) for _, condition in self.rules_on(statement))
 
     def fully(self, statement: Is) -> Group:
         """Return the group of rules that conclude a statement at strength 1."""
-        return tuple((rule.condition, FULLY) for rule in rules_on(self._system, statement) if rule.weight == 1.0)
+        return tuple((condition, FULLY) for rule, condition in self.rules_on(statement) if rule.weight == 1.0)
 
     def above_half(self, statement: Is) -> Group:
         """Return the group of rules that conclude a statement above 1/2."""
-        return tuple(
-            (rule.condition, rank(HALF / Fraction(rule.weight), self._levels))
-            for rule in rules_on(self._system, statement)
-            if rule.weight > 0.5
-        )
+        chosen = [(rule, condition) for rule, condition in self.rules_on(statement) if rule.weight > 0.5]
+        ranks = ranked(np.array([0.5 / rule.weight for rule, _ in chosen]), self._levels).tolist()
+        return tuple((condition, rank) for (_, condition), rank in zip(chosen, ranks, strict=True))
+
+    def each(self) -> list[Group]:
+        """Return a group for each rule, at any strength."""
+        return [((condition, FIRES),) for condition in self._conditions]
 
     def ask(self, goals: Sequence[Goal], max_boxes: int = 1) -> list[Answer]:
         """Search for the goals; goals with the same inputs share a search."""
@@ -103,13 +121,9 @@ class Questions:
         for i, goal in enumerate(goals):
             together.setdefault(goal.inputs(), []).append(i)
         answers: dict[int, Answer] = {}
-        share = Effort(self._effort.share(), len(together))
-        top = 2 * len(self._levels)
         for members in together.values():
-            search = Search([goals[i] for i in members], self._domains, top)
-            results, used = search.run(share.share(), max_boxes)
-            share.use(used)
-            self._effort.use(used)
+            search = Search([goals[i] for i in members], self._domains, 2 * len(self._levels))
+            results = search.run(self._effort // SEARCHES // len(together), max_boxes)
             answers.update(zip(members, results, strict=True))
         return [answers[i] for i in range(len(goals))]
 
@@ -121,17 +135,18 @@ class Questions:
         """Return the number of combinations of patterns."""
         return math.prod(len(domain.positions) for domain in self._domains.values())
 
-    def samples(self) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    def samples(self) -> Array:
         """Return combinations of the patterns' places, all of them or 4096 by a fixed seed."""
-        places = [np.array(self._domains[v.name].positions, dtype=np.float64) for v in self._system.inputs]
-        if self.combinations() <= SAMPLES:
+        known = {name: np.array(domain.positions, dtype=np.float64) for name, domain in self._domains.items()}
+        places = [known.get(v.name, np.array(v.universe)) for v in self._system.inputs]
+        if math.prod(map(len, places)) <= SAMPLES:
             return np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(places))
         random = np.random.default_rng(0)
         return np.column_stack([random.choice(place, SAMPLES) for place in places])
 
 
-def reach(system: System, conditions: Sequence[Proposition]) -> Reach:
-    """Return the strength of a proof by ranks at 1/2 for a system's *and* and *or*."""
+def reach(system: System, conditions: Sequence[Proposition]) -> str:
+    """Return the strength of a proof by ranks at 1/2 for a system's *and* and *or*: exact, a bound, or samples only."""
     parts = [part for condition in conditions for part in condition.parts_within()]
     if system.disjunction != "max" and any(isinstance(part, Or) for part in parts):
         return "samples"
@@ -139,16 +154,3 @@ def reach(system: System, conditions: Sequence[Proposition]) -> Reach:
         return "exact"
     negated = [part.part for part in parts if isinstance(part, Not)]
     return "bound" if all(isinstance(part, Is) for part in negated) else "samples"
-
-
-def sampled(system: System, questions: Questions, statements: Sequence[Is]) -> dict[str, float | str] | None:
-    """Return a sample at which two of some statements are concluded above 1/2."""
-    samples = questions.samples()
-    firing = Firing(system)
-    cuts = firing.cuts(firing.strengths(samples))
-    terms = {v.name: (k, v.term_names) for k, v in enumerate(system.outputs)}
-    chosen = [cuts[terms[s.variable][0]][terms[s.variable][1].index(s.term)] for s in statements]
-    rows = np.flatnonzero((np.array(chosen) > 0.5 + 1e-9).sum(axis=0) >= 2)
-    if not len(rows):
-        return None
-    return {v.name: float(x) for v, x in zip(system.inputs, samples[rows[0]], strict=True)}

@@ -33,9 +33,11 @@ def redundant(system: System) -> Iterator[Finding]:
     # The check uses the form of conditions: `a and b` is never above `a`, nor `a` above `a or b`.
     lattice = system.conjunction == "min" and system.disjunction == "max"
     by_conclusion: dict[Is, list[tuple[int, Rule]]] = defaultdict(list)
+    outputs = {v.name for v in system.outputs}
     for i, rule in enumerate(system.rules):
-        for conclusion in rule.conclusions:
-            by_conclusion[conclusion].append((i, rule))
+        if rule.operators is None and not any(s.variable in outputs for s in rule.condition.terms()):
+            for conclusion in rule.conclusions:
+                by_conclusion[conclusion].append((i, rule))
     many = [str(conclusion) for conclusion, rules in by_conclusion.items() if len(rules) > MAX_COMPARED]
     if many:
         what = f"not compared with each other, being more than {MAX_COMPARED}: rules on {', '.join(many)}"

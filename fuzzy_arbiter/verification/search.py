@@ -53,7 +53,9 @@ class Search:
 
     def __init__(self, goals: Sequence[Goal], domains: Mapping[str, Domain], top: int) -> None:
         self._goals = goals
-        self._logic: Logic[Bounds] = Logic(_min, _max, lambda a: _not(a, top))
+        whole = np.array([top - 1], dtype=np.int32)  # rank of the degree 1
+        # hedges keep the degrees 0 and 1, and those between
+        self._logic: Logic[Bounds] = Logic(_min, _max, lambda a: _not(a, top), lambda _, a: a, (whole, whole))
         groups: dict[Group, int] = {}
         self._members = [[groups.setdefault(group, len(groups)) for group in goal.groups] for goal in goals]
         self._groups = len(groups)
@@ -82,7 +84,7 @@ class Search:
                 self._bounds[Is(name, domain.terms[j])] = ranks.min(keepdims=True), ranks.max(keepdims=True)
         self.combinations = math.prod(map(len, self._patterns))
 
-    def run(self, limit: int, max_boxes: int = 1) -> tuple[list[Answer], int]:
+    def run(self, limit: int, max_boxes: int = 1) -> list[Answer]:
         """Search for boxes that meet the goals."""
         boxes_by_goal: list[list[Box]] = [[] for _ in self._goals]
         open_goals = list(range(len(self._goals)))
@@ -110,10 +112,9 @@ class Search:
                 grown = np.repeat(boxes, len(patterns), axis=0)
                 stack.append(np.column_stack((grown, np.tile(patterns, len(boxes)))))
         is_complete = not stack  # for a goal that has max_boxes, others were left out
-        answers = [
+        return [
             Answer(tuple(boxes), is_complete and len(boxes) < max_boxes, self.combinations) for boxes in boxes_by_goal
         ]
-        return answers, searched * self._cost
 
     def _box(self, row: NDArray[np.int32]) -> Box:
         return {self._order[i]: int(self._patterns[i][p]) for i, p in enumerate(row)}

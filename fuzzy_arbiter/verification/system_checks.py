@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -15,18 +16,9 @@ from fuzzy_arbiter.engines.supported import unsupported_reason
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.rule import Operators
+from fuzzy_arbiter.shapes import Array
 from fuzzy_arbiter.verification.cells import Stretch, stretches
-from fuzzy_arbiter.verification.questions import (
-    ANY,
-    FIRES,
-    SAMPLES,
-    Effort,
-    Questions,
-    greatest_term,
-    reach,
-    rules_on,
-    sampled,
-)
+from fuzzy_arbiter.verification.questions import ANY, SAMPLES, Questions, conditions_on_inputs, greatest_term, reach
 from fuzzy_arbiter.verification.report import Check, Finding, Place, Row, Severity, Verification
 from fuzzy_arbiter.verification.rules import labels, redundant, unused
 from fuzzy_arbiter.verification.search import Answer, Goal
@@ -60,8 +52,8 @@ def verify(system: System, effort: int = EFFORT, as_criteria: bool | None = None
     Raises
     ------
     UnsupportedError
-        If the system has more than the checks support: piecewise-linear terms of inputs, *min* and *max* or their
-        products; of criteria also piecewise-linear terms of outputs and the centroid.
+        If a variable has more than 200 terms; of criteria also if terms are not piecewise linear, norms not *min* and
+        *max* or their products, or values not centroids.
 
     Examples
     --------
@@ -72,7 +64,7 @@ def verify(system: System, effort: int = EFFORT, as_criteria: bool | None = None
     True
     """
     as_criteria = bool(system.weights_of) if as_criteria is None else as_criteria
-    if reason := unsupported_reason(system, any_outputs=not as_criteria):
+    if as_criteria and (reason := unsupported_reason(system)):
         raise UnsupportedError(f"verify: {reason}")
     for variable in (*system.inputs, *system.outputs):
         if len(variable.terms) > MAX_TERMS:
@@ -88,7 +80,7 @@ def verify(system: System, effort: int = EFFORT, as_criteria: bool | None = None
         checks.halves()
     gaps = tuple(stretch for variable in system.inputs for stretch in stretches(variable))
     findings = [*checks.findings, *map(_stretch, gaps), *unused(system), *redundant(system)]
-    row_count = math.prod(len(v.terms) for v in system.inputs)
+    row_count = math.prod(len(v.terms) or 1 for v in system.inputs)
     return Verification(
         variable_names(system.inputs),
         variable_names(system.outputs),
@@ -107,7 +99,7 @@ class _Checks:
         self.system = system
         self.checks: list[Check] = []
         self.findings: list[Finding] = []
-        self._effort = Effort(effort, 8)
+        self._effort = effort
         self._terms = {v.name: tuple(Is(v.name, term) for term in v.term_names) for v in system.outputs}
 
     @functools.cached_property
@@ -153,10 +145,14 @@ class _Checks:
         """Check that rules fire at all for graded inputs."""
         ask = Questions.of_support(self.system, self._effort)
         self._complete("graded_complete", ask, _ALL)
+        if not ask.proves:
+            return
         conditions = labels(self.system)
-        answers = ask.ask([Goal((((condition, FIRES),),), 1, ANY) for condition in conditions])
-        for (condition, label), answer in zip(conditions.items(), answers, strict=True):
-            if answer.is_complete and not answer.boxes:
+        answers = ask.ask([Goal((group,), 1, ANY) for group in ask.each()])
+        idle = {rule.condition for rule, answer in zip(self.system.rules, answers, strict=True)
+                if answer.is_complete and not answer.boxes}  # fmt: skip
+        for condition, label in conditions.items():
+            if condition in idle:
                 self._add("warning", "rules", f"{label}: never fires, as '{condition}' holds for no real inputs")
 
     def halves(self) -> None:
@@ -183,31 +179,60 @@ class _Checks:
         self, ask: Questions, terms: Sequence[Is], answer: Answer
     ) -> tuple[bool | None, str, Place | None]:
         """Decide if no two of some terms are above 1/2 at once; return verdict, method, and counterexample."""
-        reaches = reach(self.system, [rule.condition for term in terms for rule in rules_on(self.system, term)])
+        reaches = reach(self.system, [rule.condition for term in terms for rule, _ in ask.rules_on(term)])
         if answer.is_complete and not answer.boxes and reaches != "samples":
             return True, _ALL + (", as for 'min', which 'prod' is never above" if reaches == "bound" else ""), None
         if answer.boxes and reaches == "exact":
             return False, "", ask.places(answer.boxes[0])
-        place = sampled(self.system, ask, terms)
-        if place is not None:
-            return False, "", place
-        return None, f"{min(SAMPLES, ask.combinations())} samples of {_count(ask.combinations())} show none", None
+        place, how = self._sampled(ask, terms, lambda cuts: (cuts > 0.5 + 1e-9).sum(axis=0) >= 2)
+        return (None if place is None else False), how, place
+
+    def _sampled(
+        self, ask: Questions, statements: Sequence[Is], is_bad: Callable[[Array], Any]
+    ) -> tuple[Place | None, str]:
+        """Return a sample at which strengths of statements, (statements, n), are bad; and the search in words."""
+        samples, firing = ask.samples(), Firing(self.system)
+        strengths = firing.strengths(samples)
+        none = np.zeros(len(samples))
+        joined = [
+            functools.reduce(
+                np.maximum,
+                (x for x, rule in zip(strengths, self.system.rules, strict=True) if s in rule.conclusions),
+                none,
+            )
+            for s in statements
+        ]
+        rows = np.flatnonzero(is_bad(np.array(joined)))
+        if len(rows):
+            values = zip(self.system.inputs, samples[rows[0]], strict=True)
+            return {v.name: float(x) for v, x in values}, "by an example"
+        return None, f"{min(SAMPLES, ask.combinations())} samples of {_count(ask.combinations())} show none"
 
     def _complete(self, name: str, ask: Questions, where: str) -> None:
+        """Check that a rule fires for each output; for norms that may be 0 of positive degrees, by samples."""
+        open_ones: list[str] = []
         answers = ask.ask([Goal(tuple(map(ask.firing, terms)), 0, 0) for terms in self._terms.values()])
-        for output, answer in zip(self.system.outputs, answers, strict=True):
+        for output, terms, answer in zip(self.system.outputs, self._terms.values(), answers, strict=True):
             default = "no default" if output.default is None else f"its default {output.default:g} there"
-            for place in map(ask.places, answer.boxes):
+            places = [ask.places(box) for box in answer.boxes]
+            if name != "complete" and not ask.proves and not places:
+                place, how = self._sampled(ask, terms, lambda cuts: ~cuts.any(axis=0))
+                places, open_ones = ([place], open_ones) if place is not None else ([], [*open_ones, how])
+            for place in places:
                 text = f"output {output.name!r}: no rule fires where {_format_place(place)}; it has {default}"
                 self._add("fault" if output.default is None else "warning", name, text, place)
-        self._decided(name, answers, where)
+        if open_ones or any(f.about == name for f in self.findings):
+            holds = False if any(f.about == name for f in self.findings) else None
+            self._conclude(name, holds, "by an example" if holds is False else open_ones[0])
+        else:
+            self._decided(name, answers, where)
 
     def _decided(self, name: str, answers: Sequence[Answer], where: str) -> None:
         open_ones = [answer.combinations for answer in answers if not answer.is_complete]
         if any(answer.boxes for answer in answers):
             self._conclude(name, False, "by an example")
         elif open_ones:
-            limit = f"more than an effort of {self._effort.limit:g} statements settles"
+            limit = f"more than an effort of {self._effort:g} statements settles"
             self._conclude(name, None, f"{_count(max(open_ones))} combinations are {limit}")
         else:
             self._conclude(name, True, where)
@@ -266,11 +291,12 @@ def _stretch(stretch: Stretch) -> Finding:
 
 def _rows(system: System) -> Iterator[Row]:
     names = variable_names(system.inputs)
-    rows = list(itertools.product(*(v.term_names[::-1] for v in system.inputs)))
+    rows = list(itertools.product(*(v.term_names[::-1] or ("any",) for v in system.inputs)))
     columns = dict(zip(names, np.array(rows, dtype=object).T, strict=True))
     logic = logic_of(Operators(), many=True)
     labeled = {Is(v.name, t): (columns[v.name] == t).astype(np.float64) for v in system.inputs for t in v.term_names}
-    fires = [logic.degree(rule.condition, labeled.__getitem__) > 0.0 for rule in system.rules]
+    degrees = [logic.degree(condition, labeled.__getitem__) for condition in conditions_on_inputs(system)]
+    fires = [np.broadcast_to(degree > 0.0, len(rows)) for degree in degrees]
     for i, terms in enumerate(rows):
         fired = [r for r in range(len(fires)) if fires[r][i]]
         concluded = {statement for r in fired for statement in system.rules[r].conclusions}

@@ -2,14 +2,16 @@
 
 import functools
 import itertools
+import re
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Variable
+from fuzzy_arbiter import Arbiter, Output, System, Variable, curve, falling, rising
 from fuzzy_arbiter.propositions import Is
+from fuzzy_arbiter.terms.norms import S_NORMS, T_NORMS
 from fuzzy_arbiter.verification import verify as verify_system
 from fuzzy_arbiter.verification.cells import stretches
 from tests.examples import examples
@@ -101,6 +103,8 @@ def test_stretches_against_samples(drawn):
     found = stretches(v)
     for x in np.linspace(0, 1, 65).tolist():
         total = float(sum(reference.degree(t.shape, x) for t in v.terms))
+        if any(0.0 < abs(x - end) < 1e-12 for s in found for end in (s.start, s.end)):  # an end is rounded
+            continue
         inside = {
             s.kind: s
             for s in found
@@ -111,3 +115,32 @@ def test_stretches_against_samples(drawn):
         assert ("gap" in inside) == (total == 0)
         for stretch in inside.values():
             assert stretch.least - 1e-12 <= total <= stretch.greatest + 1e-12
+
+
+@pytest.mark.parametrize("conjunction", T_NORMS)
+@pytest.mark.parametrize("disjunction", S_NORMS)
+def test_completeness_of_any_norms_and_curves_against_samples(conjunction, disjunction):
+    """Samples refute no yes, the engine has no value where a no says so, and the usual norms are decided."""
+    x = Variable("x", (0, 10), {"a": curve("gaussian", 3, 1), "b": curve("s_shape", 2, 9)})
+    z = Variable("z", (0, 10), {"a": rising(2, 4), "b": falling(2, 4)})
+    y = Output("y", (0, 1), LOW_HIGH[0].terms)
+    w = Output("w", (0, 1), LOW_HIGH[0].terms, defuzzifier="bisector")
+    cases = (
+        ("if z is a and x is a then y is low", "if z is very b or x is not b then y is high"),
+        ("if not (z is a and z is b) then y is low",),
+        ("if not (z is a or x is b) then y is low", "if z is a then y is high"),
+        ("if z is a then y is low", "if y is low or z is b then w is low", "if z is b and w is not low then y is high"),
+    )
+    for rules in cases:
+        concluded = tuple(v for v in (y, w) if any(f"then {v.name}" in rule for rule in rules))
+        made = System((x, z), concluded, rules, conjunction=conjunction, disjunction=disjunction)
+        answer, arbiter = verify_system(made), Arbiter(made)
+        rng = np.random.default_rng(1)
+        undefined = np.isnan(arbiter.batch(np.round(rng.uniform(0, 10, (400, 2)), 1)))
+        assert answer.graded_complete is not True or not undefined.any()
+        for finding in answer.findings:
+            if finding.about == "graded_complete" and finding.place is not None:
+                k = [v.name for v in concluded].index(re.search("output '(.)'", finding.text)[1])
+                assert np.isnan(arbiter([finding.place.get(v.name, 0.0) for v in made.inputs])[k])
+        if conjunction in ("min", "prod") and disjunction in ("max", "probor"):
+            assert answer.graded_complete is not None or "w is not" in rules[-1]
