@@ -131,23 +131,22 @@ def clipped(
         below = zero  # the greatest cut of the lines above
         for i in range(first[piece], first[piece + 1]):
             line = order[i]
-            t = term[line]
-            if cuts[t] > below:
-                a, b = left[line], right[line]
-                low, high = min(a, b), max(a, b)  # a falling line is treated as the mirrored rising one
-                y0 = max(min(cuts[t], low), below)
-                y1 = max(min(cuts[t], high), below)
-                h0, h1 = y0 - below, y1 - below
-                # where the line has these heights, in shares of the piece
-                s0 = min(max((y0 - low) / (high - low), zero), one) if low < high else zero
-                s1 = min(max((y1 - low) / (high - low), zero), one) if low < high else zero
-                band = (s1 - s0) * (h0 + h1) / 2 + (one - s1) * h1
-                lever = (s1 - s0) * (s0 * (2 * h0 + h1) + s1 * (h0 + 2 * h1)) / 6 + (one - s1) * (one + s1) / 2 * h1
-                if a > b:
-                    lever = band - lever
-                area += width * band
-                moment += width * (start * band + width * lever)
-                below = cuts[t]
+            cut = cuts[term[line]]
+            a, b = left[line], right[line]
+            low, high = min(a, b), max(a, b)  # a falling line is treated as the mirrored rising one
+            y0 = max(min(cut, low), below)
+            y1 = max(min(cut, high), below)
+            h0, h1 = y0 - below, y1 - below
+            # where the line has these heights, in shares of the piece
+            s0 = min(max((y0 - low) / (high - low), zero), one) if low < high else zero
+            s1 = min(max((y1 - low) / (high - low), zero), one) if low < high else zero
+            band = (s1 - s0) * (h0 + h1) / 2 + (one - s1) * h1
+            lever = (s1 - s0) * (s0 * (2 * h0 + h1) + s1 * (h0 + 2 * h1)) / 6 + (one - s1) * (one + s1) / 2 * h1
+            if a > b:
+                lever = band - lever
+            area = area + width * band
+            moment = moment + width * (start * band + width * lever)
+            below = max(below, cut)
     return area, moment
 
 
