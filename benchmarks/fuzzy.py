@@ -43,6 +43,12 @@ _OTHER_TIPPING: dict[str, dict[str, Any]] = {
     "sum of triangles": {"aggregation": "sum"},
     "probabilistic sum of triangles": {"aggregation": "probor"},
 }
+_FUZZYLITE_WORDS: dict[str, dict[str, str]] = {name: {} for name in _OTHER_TIPPING} | {
+    "Gaussian tips, bisector": {"defuzzifier": "Bisector"},
+    "Gaussian tips, mean of maxima": {"defuzzifier": "MeanOfMaximum"},
+    "sum of triangles": {"aggregation": "UnboundedSum"},
+    "probabilistic sum of triangles": {"aggregation": "AlgebraicSum"},
+}
 
 
 def measure(steps: int, repeats: int) -> list[Row]:
@@ -77,8 +83,18 @@ def measure(steps: int, repeats: int) -> list[Row]:
         other, rows = _tipping(**options), batch[: max(1, len(batch) // _SLOWER), :2] * 10.0
         add(f"one call: exact, tipping, {name}", _calls(other, few, repeats))
         add(f"batch of {len(rows)}: exact, tipping, {name}", time_batches(_batch(other, rows), len(rows), repeats))
+        words = {"system": "gaussian_tipping" if "curved" in options else "tipping", **_FUZZYLITE_WORDS[name]}
+        for points in (100, 1000):
+            label = f"batch of {len(rows)}: pyfuzzylite, resolution {points}, tipping, {name}"
+            add(label, _other_batch({**words, "resolution": points}, len(rows), repeats))
+        if "curved" in options:
+            setup = {"points": POINTS, "defuzzifier": options.get("defuzzifier", "centroid")}
+            stock = _stock(skfuzzy_rules.tipping, max(2, few // 10), repeats, setup)
+            add(f"batch: scikit-fuzzy, stock, arrays, {POINTS} points, tipping, {name}", stock)
+    add("simpful, resolution 100, tipping, Gaussian tips", _other("simpful", few, repeats, "gaussian_tipping"))
     for system in ("section_vi", "tipping"):
-        add(f"batch of {len(batch)}: pyfuzzylite, resolution 100, {system}", _other_batch(system, len(batch), repeats))
+        timing = _other_batch({"system": system, "resolution": 100}, len(batch), repeats)
+        add(f"batch of {len(batch)}: pyfuzzylite, resolution 100, {system}", timing)
     add("building: 40 criteria", time_calls(lambda: Arbiter(criteria), max(1, few // 10), repeats))
     return with_base(timings)
 
@@ -104,20 +120,19 @@ def ask(python: str, **request: Any) -> dict[str, Any]:
     return answer
 
 
-def _other(library: str, evaluations: int, repeats: int) -> Timing | str:
+def _other(library: str, evaluations: int, repeats: int, system: str = "section_vi") -> Timing | str:
     python = interpreter(library)
     if python is None:
         return f"{library} is not installed"
-    setup = {"library": library, "system": "section_vi", "resolution": 100}
+    setup = {"library": library, "system": system, "resolution": 100}
     with peer(Environment(python), library, "fuzzy_libraries", "evaluations", setup) as contestant:
         return time_contestant(contestant, evaluations, repeats)
 
 
-def _other_batch(system: str, rows: int, repeats: int) -> Timing | str:
+def _other_batch(setup: dict[str, Any], rows: int, repeats: int) -> Timing | str:
     python = interpreter("pyfuzzylite")
     if python is None:
         return "pyfuzzylite is not installed"
-    setup = {"system": system, "resolution": 100}
     with peer(Environment(python), "pyfuzzylite", "fuzzy_libraries", "batches", setup) as contestant:
         return time_contestant(contestant, rows, repeats)
 
@@ -161,10 +176,15 @@ def _looped(arbiter: Arbiter, rows: np.ndarray[Any, np.dtype[np.float64]], repea
     return time_batches(lambda: loop(rows, outputs), len(rows), repeats)
 
 
-def _stock(function: Callable[[dict[str, Any]], Callable[[int], object]], count: int, repeats: int) -> Timing:
+def _stock(
+    function: Callable[[dict[str, Any]], Callable[[int], object]],
+    count: int,
+    repeats: int,
+    setup: dict[str, Any] | None = None,
+) -> Timing:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
-        return time_contestant(InProcess(function({"points": POINTS})), count, repeats)
+        return time_contestant(Own(function(setup or {"points": POINTS})), count, repeats)
 
 
 def _calls(arbiter: Arbiter, calls: int, repeats: int, form: Callable[[list[float]], Any] | None = list) -> Timing:

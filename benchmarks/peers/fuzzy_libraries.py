@@ -35,6 +35,12 @@ _TIP = (
         "high": ((13.0, 0.0), (25.0, 1.0)),
     },
 )
+_CURVED_TIP = ((0.0, 25.0), {"low": (4.0, 3.0), "medium": (12.5, 3.0), "high": (21.0, 3.0)})  # means, deviations
+_TIPPING_RULES = (
+    (["quality is poor", "service is poor"], "or", "tip is low"),
+    (["service is average"], "", "tip is medium"),
+    (["quality is good", "service is good"], "or", "tip is high"),
+)
 # inputs, outputs, and rules in a form that is converted to the text of each library
 SYSTEMS: dict[str, Any] = {
     "section_vi": (
@@ -51,20 +57,13 @@ SYSTEMS: dict[str, Any] = {
             (["obstacle is off", "shape is off", "depth is on"], "and", "alpha_3 is high"),
         ),
     ),
-    "tipping": (
-        {"quality": _MARK, "service": _MARK},
-        {"tip": _TIP},
-        (
-            (["quality is poor", "service is poor"], "or", "tip is low"),
-            (["service is average"], "", "tip is medium"),
-            (["quality is good", "service is good"], "or", "tip is high"),
-        ),
-    ),
+    "tipping": ({"quality": _MARK, "service": _MARK}, {"tip": _TIP}, _TIPPING_RULES),
+    "gaussian_tipping": ({"quality": _MARK, "service": _MARK}, {"tip": _CURVED_TIP}, _TIPPING_RULES),
 }
 Evaluate = Callable[[list[float]], list[float]]
 
 
-def _fuzzylite_text(system: str, resolution: int) -> str:
+def _fuzzylite_text(system: str, resolution: int, defuzzifier: str = "Centroid", aggregation: str = "Maximum") -> str:
     """Return a system's text in the FuzzyLite language."""
     inputs, outputs, rules = SYSTEMS[system]
     text = [f"Engine: {system}"]
@@ -72,10 +71,16 @@ def _fuzzylite_text(system: str, resolution: int) -> str:
         for name, ((low, high), terms) in variables.items():
             text += [f"{kind}: {name}", "  enabled: true", f"  range: {low} {high}", "  lock-range: false"]
             if kind == "OutputVariable":
-                text += ["  aggregation: Maximum", f"  defuzzifier: Centroid {resolution}", "  default: nan"]
+                text += [
+                    f"  aggregation: {aggregation}",
+                    f"  defuzzifier: {defuzzifier} {resolution}",
+                    "  default: nan",
+                ]
                 text += ["  lock-previous: false"]
             for term, points in terms.items():
-                if len(points) == 3:
+                if isinstance(points[0], float):
+                    shape = "Gaussian {} {}".format(*points)
+                elif len(points) == 3:
                     shape = "Triangle {} {} {}".format(*(x for x, _ in points))
                 else:  # a ramp runs from its foot to its top
                     shape = "Ramp {} {}".format(*(x for x, _ in sorted(points, key=lambda point: point[1])))
@@ -104,7 +109,7 @@ def pyfuzzylite(system: str, resolution: int) -> tuple[Evaluate, str]:
 
 def simpful(system: str, resolution: int) -> tuple[Evaluate, str]:
     """Return a function of the inputs, and the system's terms and rules in simpful's format."""
-    from simpful import FuzzySet, FuzzySystem, LinguisticVariable
+    from simpful import FuzzySet, FuzzySystem, GaussianFuzzySet, LinguisticVariable
 
     inputs, outputs, rules = SYSTEMS[system]
     made = FuzzySystem(show_banner=False)
@@ -112,6 +117,9 @@ def simpful(system: str, resolution: int) -> tuple[Evaluate, str]:
     for name, ((low, high), terms) in {**inputs, **outputs}.items():
         sets = []
         for term, points in terms.items():
+            if isinstance(points[0], float):
+                sets.append(GaussianFuzzySet(*points, term))
+                continue
             # simpful needs a degree at both ends of the universe
             ends = [point for point in ((low, points[0][1]), (high, points[-1][1])) if point not in points]
             shown = sorted([*points, *ends])
@@ -157,7 +165,7 @@ def batches(setup: dict[str, Any]) -> Callable[[int], object]:
     import fuzzylite
     import numpy as np
 
-    engine = fuzzylite.FllImporter().from_string(_fuzzylite_text(setup["system"], setup["resolution"]))
+    engine = fuzzylite.FllImporter().from_string(_fuzzylite_text(**setup))
     rng, ranges = np.random.default_rng(0), [span for span, _ in SYSTEMS[setup["system"]][0].values()]
 
     def work(count: int) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from skfuzzy import control, trimf
+from skfuzzy import control, gaussmf, trimf
 
 NAMES = ("obstacle", "shape", "depth")
 
@@ -56,6 +56,32 @@ def arrays(setup: dict[str, Any]) -> Callable[[int], object]:
     def work(count: int) -> None:
         for name, column in zip(NAMES, rng.random((len(NAMES), max(2, count))), strict=True):
             system.input[name] = column
+        system.compute()
+
+    return work
+
+
+def tipping(setup: dict[str, Any]) -> Callable[[int], object]:
+    """Return a function that computes a given number of rows of tipping, with Gaussian tips, at once."""
+    warnings.simplefilter("ignore", DeprecationWarning)
+    marks = [control.Antecedent(np.linspace(0.0, 10.0, setup["points"]), name) for name in ("quality", "service")]
+    for mark in marks:
+        mark.automf(3)
+    universe = np.linspace(0.0, 25.0, setup["points"])
+    tip = control.Consequent(universe, "tip", defuzzify_method=setup["defuzzifier"])
+    for name, mean in (("low", 4.0), ("medium", 12.5), ("high", 21.0)):
+        tip[name] = gaussmf(universe, mean, 3.0)
+    quality, service = marks
+    rules = [
+        control.Rule(quality["poor"] | service["poor"], tip["low"]),
+        control.Rule(service["average"], tip["medium"]),
+        control.Rule(quality["good"] | service["good"], tip["high"]),
+    ]
+    system, rng = control.ControlSystemSimulation(control.ControlSystem(rules)), np.random.default_rng(0)
+
+    def work(count: int) -> None:
+        for mark, column in zip(marks, rng.uniform(0.0, 10.0, (2, max(2, count))), strict=True):
+            system.input[mark.label] = column
         system.compute()
 
     return work

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import itertools
 import statistics
-import time
+import timeit
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -50,15 +51,8 @@ def bench(system: System) -> str:
 
 def _median(work: Callable[[int], object]) -> tuple[float, int]:
     """Return the median time of one of n things [us], and the n that takes about a repeat's time."""
-    work(4)  # warm up: caches and lazy imports
-    n = 1
-    while (spent := _timed(work, n)) <= _SECONDS / 4.0 and n < _MAX_COUNT:
+    n, seconds = 4, timeit.timeit(partial(work, 4), number=1)  # which warms caches and lazy imports up, too
+    while seconds < _SECONDS / 4.0 and n < _MAX_COUNT:
         n = min(_MAX_COUNT, n * 4)
-    n = max(1, min(_MAX_COUNT, int(n * _SECONDS / max(spent, 1e-9))))
-    return statistics.median(_timed(work, n) for _ in range(REPEATS)) / n * 1e6, n
-
-
-def _timed(work: Callable[[int], object], n: int) -> float:
-    before = time.perf_counter()
-    work(n)
-    return time.perf_counter() - before
+        seconds = timeit.timeit(partial(work, n), number=1)
+    return statistics.median(timeit.repeat(partial(work, n), number=1, repeat=REPEATS)) / n * 1e6, n

@@ -150,6 +150,17 @@ def clipped(
     return area, moment
 
 
+def crossing(a: Any, b: Any, c: Any, d: Any) -> Any:
+    """Return where a line from a to b meets one from c to d, as a fraction of the width; 0 where they do not."""
+    # their differences at the ends have not one sign, nor are both 0
+    return (a - c) / ((a - c) - (b - d)) if (a < c) != (b < d) else (a - a) * 0
+
+
+def higher(degree: Any, height: Any, new: Any, old: Any) -> Any:
+    """Return the new value where a degree is above a height, else the old one."""
+    return new if degree > height else old
+
+
 def scaled(
     cuts: Numbers, breakpoints: Numbers, first: Numbers, term: Numbers, left: Numbers, right: Numbers
 ) -> tuple[Any, Any]:
@@ -161,28 +172,25 @@ def scaled(
         width = breakpoints[piece + 1] - breakpoints[piece]
         start = breakpoints[piece] - breakpoints[0]
         # where the envelope may break, in shares of the piece
-        breaks = [zero, one]
+        breaks = [one]
         for i in range(first[piece], first[piece + 1]):
             for j in range(first[piece], i):
                 a, b = left[i] * cuts[term[i]], right[i] * cuts[term[i]]
-                c, d = left[j] * cuts[term[j]], right[j] * cuts[term[j]]
-                if (a < c) != (b < d):  # so that the two differences have not one sign, nor are both 0
-                    breaks.append((a - c) / ((a - c) - (b - d)))
-        breaks.sort()
+                breaks.append(crossing(a, b, left[j] * cuts[term[j]], right[j] * cuts[term[j]]))
         x0 = zero
-        for x1 in breaks:
-            if x0 < x1:
-                # the middle shows which line is the greatest; at an end it would be lost to rounding
-                height = y0 = y1 = zero
-                for i in range(first[piece], first[piece + 1]):
-                    a, rise, cut = left[i], right[i] - left[i], cuts[term[i]]
-                    degree = (a + rise * ((x0 + x1) / 2)) * cut
-                    if degree > height:
-                        height, y0, y1 = degree, (a + rise * x0) * cut, (a + rise * x1) * cut
-                w = (x1 - x0) * width
-                area += w * (y0 + y1) / 2
-                moment += w * ((start + x0 * width) * (2 * y0 + y1) + (start + x1 * width) * (y0 + 2 * y1)) / 6
-                x0 = x1
+        for x1 in sorted(breaks):
+            # the middle shows which line is the greatest; at an end it would be lost to rounding
+            height = y0 = y1 = zero
+            for i in range(first[piece], first[piece + 1]):
+                a, rise, cut = left[i], right[i] - left[i], cuts[term[i]]
+                degree = (a + rise * ((x0 + x1) / 2)) * cut
+                y0 = higher(degree, height, (a + rise * x0) * cut, y0)
+                y1 = higher(degree, height, (a + rise * x1) * cut, y1)
+                height = max(height, degree)
+            w = (x1 - x0) * width
+            area = area + w * (y0 + y1) / 2
+            moment = moment + w * ((start + x0 * width) * (2 * y0 + y1) + (start + x1 * width) * (y0 + 2 * y1)) / 6
+            x0 = x1
     return area, moment
 
 

@@ -18,8 +18,8 @@ from fuzzy_arbiter.definition import Output
 from fuzzy_arbiter.engines.defuzzification import HEIGHT_RATIO, positions_of_maximum
 from fuzzy_arbiter.engines.engine import Defuzzifier
 from fuzzy_arbiter.engines.firing import Slot
-from fuzzy_arbiter.engines.panels import Indices, halved, points_of, roots, smooth_panels
-from fuzzy_arbiter.engines.quadrature import Quadrature, centroid_bound
+from fuzzy_arbiter.engines.panels import Indices, Mask, halved, points_of, roots, smooth_panels
+from fuzzy_arbiter.engines.quadrature import BOUND, Quadrature, centroid_bound
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.shapes import Array, Membership
 from fuzzy_arbiter.terms.curves import Curve
@@ -39,6 +39,7 @@ _ERROR = 1e-10  # maximum error of a sample's area, as a fraction of it; quadrat
 _NOISE = 1e-14  # error of a degree by rounding
 _MIN_HEIGHT = 1e-6  # minimum height of which a polynomial tells the position; quadrature takes lower ones
 _JUMP = 1e-8  # minimum height of a jump at the end of a panel
+_GAP = 1e-12  # fraction of the area, nearer to which the half may lie in a gap
 _MIN_MARGIN = 1e-12  # terms whose degrees differ by less do not cross
 _MAX_TABLE = 2**24  # maximum number of degrees in the tables of terms, and that are compared to find crossings
 _BLOCK = 2**18  # number of heights that are computed at a time
@@ -51,7 +52,7 @@ _LEVER = _INTEGRAL + _ORDER + 1
 
 
 class ClippedCurves(Defuzzifier):
-    """The centroid of smooth terms, clipped or in a sum; or where the maximum of clipped or scaled ones is."""
+    """Centroid or bisector of smooth terms, clipped or in a sum; or where the maximum of clipped or scaled ones is."""
 
     def __init__(self, output: Output, slots: Sequence[Slot]) -> None:
         shapes = [output.terms[slot.term].membership for slot in slots]
@@ -61,7 +62,8 @@ class ClippedCurves(Defuzzifier):
         self._universe, self._kind = output.universe, output.defuzzifier
         bound = f"within {centroid_bound(output):g} of the universe's width"
         self.method = {
-            "centroid": "integrals of polynomials, " + ("to rounding" if all(s.polynomial for s in shapes) else bound)
+            "centroid": "integrals of polynomials, " + ("to rounding" if all(s.polynomial for s in shapes) else bound),
+            "bisector": f"integrals of polynomials, halves of the area within {BOUND:g} of it",
         }.get(self._kind, "positions at which polynomials have the maximum height, without a bound of their errors")
         self._max, self._scales = output.aggregation == "max", slots[0].implication == "prod"
         edges = smooth_panels(output.universe, list(dict.fromkeys(shapes)))
@@ -81,19 +83,23 @@ class ClippedCurves(Defuzzifier):
     def values(self, cuts: Array, inputs: Array) -> Array:
         """Return the values for many samples; cuts (slots, n)."""
         size = max(1, _BLOCK // self._lines.shape[1])
-        compute = self._centroids if self._kind == "centroid" else self._of_maximum
+        compute = self._of_area if self._kind in ("centroid", "bisector") else self._of_maximum
         return np.concatenate([compute(cuts[:, i : i + size]) for i in range(0, max(1, cuts.shape[1]), size)])
 
     @functools.cached_property
     def _quadrature(self) -> Quadrature:
         return self._make_quadrature()
 
-    def _centroids(self, cuts: Array) -> Array:
+    def _of_area(self, cuts: Array) -> Array:
+        """Return centroids or bisectors; quadrature takes those of an area that is too small."""
         if cuts.shape[1] == 1:  # of two columns NumPy adds rows in their order, as of many
-            return self._centroids(np.repeat(cuts, 2, axis=1))[:1]
-        area, moment = self._scaled(cuts) if self._scales else self._clipped(cuts)
-        smooth = area * _ERROR >= self._error
-        result = self._universe[0] + moment / np.where(smooth, area, 1.0)
+            return self._of_area(np.repeat(cuts, 2, axis=1))[:1]
+        if self._kind == "bisector":
+            result, smooth = self._bisectors(cuts)
+        else:
+            area, moment = self._scaled(cuts) if self._scales else self._clipped(cuts)
+            smooth = area * _ERROR >= self._error
+            result = self._universe[0] + moment / np.where(smooth, area, 1.0)
         if not smooth.all():
             result[~smooth] = self._quadrature.values(cuts[:, ~smooth], cuts)
         return np.minimum(np.maximum(result, self._universe[0]), self._universe[1])
@@ -104,7 +110,12 @@ class ClippedCurves(Defuzzifier):
         return _summed(self._full[0], heights), _summed(self._full[1], heights)
 
     def _clipped(self, cuts: Array) -> tuple[Array, Array]:
-        """Return the areas and moments of clipped terms, each above those before it; cuts (slots, n), returns (n,)."""
+        """Return the areas and moments of clipped terms; cuts (slots, n), returns (n,)."""
+        areas, moments, _, _ = self._parts(cuts)
+        return _summed(self._signs, areas), _summed(self._signs, moments)
+
+    def _parts(self, cuts: Array) -> tuple[Array, Array, Array, Array]:
+        """Return each line's area and moment, (lines, n), above those before it, its level, and where it meets that."""
         tops = cuts[self._slots]  # (panels, terms of a panel, n)
         bottoms = np.zeros_like(tops)
         if self._max:
@@ -119,8 +130,43 @@ class ClippedCurves(Defuzzifier):
         moments = np.where(full, self._full[1][:, None], middle * areas)
         meets = np.nonzero(counts & (levels > low) & ~full)
         lines, cut = self._lines[:, meets[0]], levels[meets]
-        areas[meets], moments[meets] = _integrals(lines, self._meeting(lines, meets[0], cut), cut)
-        return _summed(self._signs, areas), _summed(self._signs, moments)
+        ends = np.where(full, 1.0, -1.0)
+        ends[meets] = self._meeting(lines, meets[0], cut)
+        areas[meets], moments[meets] = _integrals(lines, ends[meets], cut)
+        return areas, moments, levels, ends
+
+    def _bisectors(self, cuts: Array) -> tuple[Array, Mask]:
+        """Return the positions that halve the areas, and True where they are accurate and not in or beside a gap."""
+        areas, _, levels, ends = self._parts(cuts)
+        count, rows = len(self._slots), np.arange(cuts.shape[1])
+        index = np.arange(len(areas)).reshape(-1, count, self._slots.shape[1])  # of tops and bottoms, by panel
+        of_panels = (self._signs[:, None] * areas)[index].sum(axis=(0, 2))
+        sums = np.cumsum(of_panels, axis=0)
+        half = sums[-1] / 2
+        panel = np.minimum((sums < half).sum(axis=0), count - 1)
+        missing = half - sums[panel, rows] + of_panels[panel, rows]
+        chosen = index[:, panel].transpose(0, 2, 1).reshape(-1, len(rows))  # (lines, n)
+        middle, width, sign, *_ = self._lines[:_DEGREE, chosen]
+        integral, level, end = self._lines[_INTEGRAL:_LEVER, chosen], levels[chosen, rows], ends[chosen, rows]
+
+        def below(r: Array, which: Indices) -> Array:
+            """Return each line's area before a position in its panel."""
+            powers = _powers(np.minimum(r, end[:, which]).ravel(), _ORDER + 1).reshape(-1, *r.shape)
+            before = (integral[:, :, which] * powers).sum(axis=0)
+            return np.asarray(before + level[:, which] * np.maximum(r - end[:, which], 0.0))
+
+        whole = below(np.ones(chosen.shape), rows)
+
+        def lacking(t: Array, which: Indices) -> Array:
+            rises = sign[:, which] > 0.0
+            part = below(np.where(rises, t, -t), which)
+            part = np.where(rises, part, whole[:, which] - part) * width[:, which] * self._signs[chosen[:, which]]
+            return np.asarray(part.sum(axis=0) - missing[which])
+
+        t, has_root = roots(lacking, np.full(len(rows), -1.0), np.ones(len(rows)), 1e-16)
+        inside = (missing > half * _GAP) & (of_panels[panel, rows] - missing > half * _GAP)
+        result = self._universe[0] + middle[0] + width[0] * np.where(has_root, t, 0.0)
+        return result, has_root & inside & (2 * half * _ERROR >= self._error)
 
     def _of_maximum(self, cuts: Array) -> Array:
         """Return the mean, smallest or largest position of the maximum height; cuts (slots, n)."""

@@ -82,8 +82,8 @@ def _module(code: Program) -> Iterator[str]:
                 continue
             yield f"\n# knots of the terms of {system.outputs[k - 1].name}, and degrees right and left of them"
             yield from (f"{name}_{k} = {side!r}" for name, side in zip(TABLES, shape, strict=True))
-        for function in (clipped_centroid.clipped, clipped_centroid.scaled, clipped_centroid.centroid):
-            yield f"\n\n{inspect.getsource(function).rstrip()}"
+        for name in ("clipped", "crossing", "higher", "scaled", "centroid"):
+            yield f"\n\n{inspect.getsource(getattr(clipped_centroid, name)).rstrip()}"
     if any(code.heights):
         yield f"\n\nNODES = {heights.NODES!r}\nWEIGHTS = {heights.WEIGHTS!r}\nENDS = {heights.ENDS!r}"
         yield from (
