@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from contextlib import suppress
 from typing import ClassVar
 
@@ -9,7 +10,7 @@ from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines.clipped_centroid_batch import Centroid
 from fuzzy_arbiter.engines.clipped_curves import ClippedCurves
 from fuzzy_arbiter.engines.engine import Defuzzifier, Engine
-from fuzzy_arbiter.engines.firing import slots_of
+from fuzzy_arbiter.engines.firing import Slot, slots_of
 from fuzzy_arbiter.engines.quadrature import Quadrature
 from fuzzy_arbiter.engines.supported import curved_term
 from fuzzy_arbiter.engines.weighted import Weighted
@@ -41,23 +42,27 @@ class ExactEngine(Engine):
         return self._area_defuzzifier(system, output)
 
     def _area_defuzzifier(self, system: System, output: Output) -> Defuzzifier:
-        slots = slots_of(system, output)
-        implications = {slot.implication for slot in slots}
-        if (
-            (output.defuzzifier, output.aggregation) == ("centroid", "max")
-            and implications in ({"min"}, {"prod"})
-            and not curved_term(output)
-        ):
-            with suppress(EngineError):  # more lines than an outline should have
-                return Centroid(output, implications == {"prod"})
-        joins = {(output.aggregation, implication) for implication in implications}
-        if len(joins) == 1 and joins <= _BY_LINES.get(output.defuzzifier, set()):
-            with suppress(EngineError):  # terms that are not smooth
-                return ClippedCurves(output, slots)
-        return Quadrature(output, slots)
+        return _area_defuzzifier(output, slots_of(system, output))
 
     @property
     def methods(self) -> dict[str, str]:
         """Method of each output, with its error bound."""
         names = variable_names(self.system.outputs)
         return {name: str(one.method) for name, one in zip(names, self.defuzzifiers, strict=True)}
+
+
+@functools.lru_cache(64)  # for systems that differ elsewhere, as those that `fit` tries
+def _area_defuzzifier(output: Output, slots: tuple[Slot, ...]) -> Defuzzifier:
+    implications = {slot.implication for slot in slots}
+    if (
+        (output.defuzzifier, output.aggregation) == ("centroid", "max")
+        and implications in ({"min"}, {"prod"})
+        and not curved_term(output)
+    ):
+        with suppress(EngineError):  # more lines than an outline should have
+            return Centroid(output, implications == {"prod"})
+    joins = {(output.aggregation, implication) for implication in implications}
+    if len(joins) == 1 and joins <= _BY_LINES.get(output.defuzzifier, set()):
+        with suppress(EngineError):  # terms that are not smooth
+            return ClippedCurves(output, slots)
+    return Quadrature(output, slots)

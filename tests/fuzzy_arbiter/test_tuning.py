@@ -24,6 +24,7 @@ from fuzzy_arbiter import (
     triangle,
 )
 
+TIPS = (("low", triangle(0, 0, 13)), ("high", triangle(13, 25, 25)))
 X = np.random.default_rng(0).uniform(0, 10, (60, 2))
 
 
@@ -76,17 +77,19 @@ def test_values_are_found_as_linear_least_squares_finds_them():
     assert list(result.parameters) == ["sail.full.value", "sail.reefed.wind", "sail.reefed.constant"]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.medium(fast=1)
+@pytest.mark.parametrize("seed", [2, 0, 1, 3])
 def test_order_and_ranges_are_kept_whatever_the_data(seed):
     rng = np.random.default_rng(seed)
     system = tipping()
+    low = Output("tip", (0, 25), {**dict(TIPS), "middle": triangle(4, 12, 20)}, default=0.0)
     extremes = {"pi": curve("pi_shape", 2, 4, 6, 8), "arc": curve("arc", 9, 3), "bell": curve("bell", 5, 2, 3)}
     food = Variable("food", (0, 10), {"bad": trapezoid(0, 2, 2, 6), "fine": rising(4, 4.5), **extremes})
-    system = replace(system, inputs=(system.inputs[0], food))
+    system = replace(system, inputs=(system.inputs[0], food), outputs=(low,))
     fixed = rng.choice(["food.bad.x2", "service.*", "tip.low.x1", "nothing"])
-    result = fit(system, X[:20], rng.uniform(0, 25, 20), fixed=() if fixed == "nothing" else fixed)
+    result = fit(system, X[:12], rng.uniform(0, 25, 12), fixed=() if fixed == "nothing" else fixed)
     assert result.cost_after <= result.cost_before
-    off = Arbiter(result.system).batch(X[:20])[:, 0]
+    off = Arbiter(result.system).batch(X[:12])[:, 0]
     assert np.isfinite(off).all()
     after = {name: value for name, (_, value) in result.parameters.items()}
     for name, number in after.items():
