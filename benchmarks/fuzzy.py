@@ -184,7 +184,7 @@ def _stock(
 ) -> Timing:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
-        return time_contestant(Own(function(setup or {"points": POINTS})), count, repeats)
+        return time_contestant(InProcess(function(setup or {"points": POINTS})), count, repeats)
 
 
 def _calls(arbiter: Arbiter, calls: int, repeats: int, form: Callable[[list[float]], Any] | None = list) -> Timing:
