@@ -86,3 +86,9 @@ def _variable(
 def _lengths(element: ET.Element, starts: dict[str, str]) -> Iterator[int]:
     for dimension in element.iterfind("Dimension"):
         yield int(dimension.get("start") or starts.get(dimension.get("valueReference", "")) or 1)
+
+
+def unit_definitions(root: ET.Element) -> dict[str, dict[str, str]]:
+    """Return the attributes of ``BaseUnit`` of each unit of a model description; none of a unit without."""
+    units = root.iterfind("UnitDefinitions/Unit")
+    return {unit.get("name", ""): dict(base.attrib) for unit in units if (base := unit.find("BaseUnit")) is not None}

@@ -31,6 +31,7 @@ MAX_VARIABLES = 200_000  # maximum number of variables and aliases, for each of 
 MAX_DEPTH = 100  # maximum number of levels of nested elements
 
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # methods that FMI allows; others have no bound when unpacked
+_TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 _DESCRIPTIONS = (DESCRIPTION, "sources/buildDescription.xml")  # files that FMPy parses
 _CHUNK = 2**20  # number of bytes that are parsed at once
 
@@ -87,6 +88,22 @@ def read_description(path: Path, archive: zipfile.ZipFile, platforms: Sequence[s
         raise FmuFileError(f"{path}: is no FMU: {damaged!r} is damaged")
     _check_libraries(path, archive, library_names(roots[0], platforms), platforms)
     return roots[0]
+
+
+def terminal_members(path: Path, archive: zipfile.ZipFile) -> dict[str, list[tuple[str, ...]]]:
+    """Return the paths of variables in the terminals of an open FMU, each with the name of its member last."""
+    members: dict[str, list[tuple[str, ...]]] = {}
+
+    def read(element: ET.Element, above: tuple[str, ...]) -> None:
+        for terminal in element.iterfind("Terminal"):
+            read(terminal, (*above, terminal.get("name", "")))
+        for member in element.iterfind("TerminalMemberVariable"):
+            members.setdefault(member.get("variableName", ""), []).append((*above, member.get("memberName", "")))
+
+    if _TERMINALS in archive.namelist():
+        for terminals in _parse_member(f"{path}: {_TERMINALS}", archive, _TERMINALS).iterfind("Terminals"):
+            read(terminals, ())
+    return members
 
 
 def library_names(root: ET.Element, platforms: Sequence[str]) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from typing import Any
 
@@ -18,7 +19,10 @@ from cosim.scenario.law_factory import law_of, require_builtin_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.bindings import BoundLaw, bind_rules
+from cosim.simulation.columns import columns_of
+from cosim.simulation.fmu_law import FmuLaw
 from cosim.simulation.make_step import NO_CLOCK, exchanged_variables, make_data, make_model, make_noise, step_signals
+from cosim.simulation.signals import Signals
 from cosim.simulation.stepped_plant import plant_calls
 from cosim.step.score import FlightMetrics, fly
 from cosim.step.step_model import Array, Integers, StepData, StepModel
@@ -36,8 +40,14 @@ class FusedFlyer:
         for key, (_, expected) in _fixed_keys(base).items():
             if key in variation.keys:
                 raise RunError(f"{key} varies, expected {expected!r} for flights without a record")
-        require_builtin_law(base)
-        self._plant = Plant(base.vehicle)
+        if base.law.fmu is None:
+            require_builtin_law(base)
+        self._open = contextlib.ExitStack()
+        self._plant = self._open.enter_context(Plant(base.vehicle))
+        self._law: FmuLaw | None = None
+        if base.law.fmu:
+            self._law = FmuLaw(base)
+            self._open.callback(self._law.close)
 
     def fly(self, values: Array, seeds: NDArray[np.int64]) -> BatchResult:
         """Fly a batch; values (rows, keys), seeds (rows,)."""
@@ -52,12 +62,12 @@ class FusedFlyer:
 
     def fly_one(self, scenario: Scenario, trace: bool = False) -> tuple[NDArray[np.void], Rows]:
         """Fly one scenario of the variation; return its outcome, shape (), and its signals at each control step."""
-        metrics, model, data, signals = fly_scenario(self._plant, scenario, trace)
+        metrics, model, data, signals = fly_scenario(self._plant, scenario, trace, law=self._law)
         return _outcome(metrics, model, data), signals
 
     def close(self) -> None:
-        """Free the plant. May be called twice."""
-        self._plant.close()
+        """Free plant and law. May be called twice."""
+        self._open.close()
 
     def __enter__(self) -> FusedFlyer:
         return self
@@ -85,18 +95,22 @@ def _fixed_keys(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
 
 
 def fly_scenario(
-    plant: Plant, scenario: Scenario, trace: bool = False, clock: Integers = NO_CLOCK
+    plant: Plant, scenario: Scenario, trace: bool = False, clock: Integers = NO_CLOCK, law: FmuLaw | None = None
 ) -> tuple[FlightMetrics, StepModel, StepData, Rows]:
-    """Reset a plant, and fly a scenario with it; return its signals at each control step if a trace is wanted."""
-    law = law_of(scenario)
+    """Reset plant and FMU of the law, and fly a scenario; return the signals at control steps if a trace is wanted."""
+    if law is not None:
+        law.restart(scenario)
+    made = law or law_of(scenario)
     plant.reset()
     plant.set(start_values(scenario))
     plant.initialize()
-    inputs, outputs = exchanged_variables(scenario)
+    # an FMU may ask for any signal of a record
+    inputs, outputs = (plant.inputs.names, plant.outputs.names) if law else exchanged_variables(scenario)
     calls = plant_calls(scenario.vehicle, plant.native(inputs, outputs), plant.native)
-    model, signals = make_model(scenario, law, clock), step_signals(scenario, law, inputs, outputs)
-    data = make_data(scenario, model, law, signals, inputs, outputs, make_noise(scenario))
-    bound_law, rules = BoundLaw(law, model, data), bind_rules(scenario.rules.system, data)
+    model = make_model(scenario, made, clock, for_record=law is not None)
+    signals = Signals(columns_of(scenario, plant, law)) if law else step_signals(scenario, made, inputs, outputs)
+    data = make_data(scenario, model, made, signals, inputs, outputs, make_noise(scenario))
+    bound_law, rules = BoundLaw(made, model, data, signals), bind_rules(scenario.rules.system, data)
     decisions = -(-scenario.steps // scenario.control_every)
     rows = np.zeros((decisions if trace else 0, signals.row.size))
     metrics = FlightMetrics()

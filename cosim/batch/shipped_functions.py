@@ -28,12 +28,14 @@ from cosim.simulation.bindings import rules_text
 from cosim.simulation.make_step import exchanged_variables, make_data, make_model, make_noise, step_signals
 from cosim.simulation.step_functions import FLAT, INTEGERS, step_functions
 from cosim.step.arbiter_inputs import compute_inputs
+from cosim.step.fmu_call import FmuCalls, call_law
 from cosim.step.one_step import locate
 from cosim.step.plant_calls import Clock
 from cosim.step.score import FlightMetrics, fly
 from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
+from plant_fmu.running.native import Native
 
 _TABLE = np.zeros((1, 3))
 
@@ -56,6 +58,9 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     yield ray_distances, (regions, state.position, _TABLE, 1.0, FLAT)
     yield search_path, (empty_plan(1, 1), state.position, goal, regions, PathLimits(1.0, 1.0, 1.0, 1.0), 1.0, INTEGERS)
     yield compute_inputs, (model.inputs, goal, regions, state, 0.0, FLAT, data.signals)
+    references = np.zeros(1, np.uint32)
+    native = Native(0, 0, 0, 0, references, FLAT, references, FLAT, INTEGERS)
+    yield call_law, (FmuCalls(native, 0.01, INTEGERS, INTEGERS, FLAT, FLAT), model, data, FLAT)
     *_, (function, arguments), start = step_functions(scenario, law)
     yield fly, (*arguments[:3], FlightMetrics(), FLAT, arguments[-1])
     yield function, arguments

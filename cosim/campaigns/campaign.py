@@ -32,7 +32,7 @@ def run_campaign(
     scenes : str, Path or SceneStore
         File of the scenes with one JSON object per line, ``-`` for standard input; or a store of scenes read before.
     law : str
-        Name of the law, a key of `controller.LAWS`.
+        Name of the law, a key of `controller.LAWS`; or the .fmu file of one, or a scenario's file whose law is an FMU.
     out : str or Path
         A folder that does not exist, is empty, or holds the same campaign. A complete one gets its summary again, a
         partial one is continued.

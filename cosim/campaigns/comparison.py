@@ -18,7 +18,7 @@ from cosim.campaigns.pages.comparison_page import NUMBERS, PAGE
 from cosim.campaigns.pages.replays import WORST
 from cosim.campaigns.runner import Campaign
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.law_gains import gains_from, law_class
+from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.campaigns.scenes.scene_file import SceneStore
 from cosim.campaigns.scenes.scene_work import SceneTask
 from cosim.campaigns.store.results import Results
@@ -97,22 +97,22 @@ def compare(
     >>> sorted(path.name for path in comparison.folder.iterdir() if path.is_dir())
     ['pd', 'sun_cheah']
     """
-    for law in laws:
-        law_class(law)
-    if len(laws) < 2 or len(set(laws)) < len(laws):
+    made = {Path(law).name: gains_from(law) for law in laws}  # raises an error for an unknown law
+    if len(laws) < 2 or len(made) < len(laws):
         raise RunError(f"laws are {', '.join(laws) or 'none'}, expected two or more, each once")
     out, gains, conditions = Path(out), gains or {}, conditions or Conditions()
-    refuse_other_files(out, {NUMBERS, PAGE, *LAWS}, "a comparison")
+    refuse_other_files(out, {NUMBERS, PAGE, *LAWS, *made}, "a comparison")
 
     def numbers(campaigns: Mapping[str, Campaign]) -> dict[str, Any]:
         results = {law: campaign.results for law, campaign in campaigns.items()}
         return {
             "laws": {law: campaign.summary for law, campaign in campaigns.items()},
-            "pairs": [medians_where_completed(one, other, results) for one, other in itertools.permutations(laws, 2)],
-            "paired": [paired_differences(one, other, results) for one, other in itertools.combinations(laws, 2)],
+            "pairs": [medians_where_completed(one, other, results) for one, other in itertools.permutations(made, 2)],
+            "paired": [paired_differences(one, other, results) for one, other in itertools.combinations(made, 2)],
         }
 
-    tasks = {law: SceneTask(law, gains.get(law) or gains_from(law), conditions) for law in laws}
+    of_laws = zip(laws, made.items(), strict=True)
+    tasks = {name: SceneTask(law, gains.get(law) or own, conditions) for law, (name, own) in of_laws}
     return fly_each(Path(scenes), out, tasks, NUMBERS, numbers, workers, progress)
 
 

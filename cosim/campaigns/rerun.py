@@ -15,7 +15,7 @@ from controller import ControllerError
 from controller.regions.region_set import of_attitude
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.law_gains import law_class
+from cosim.campaigns.scenes.law_gains import digest_of_law, gains_of_plan
 from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.scene_rows import SCHEMA
 from cosim.campaigns.scenes.scene_work import SceneTask
@@ -118,7 +118,9 @@ def _sweep_repeat(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) ->
 
 
 def _scene_repeat(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
-    gains = law_class(plan["law"]).gains_type(**plan["gains"])
+    gains = gains_of_plan(plan)
+    if plan.get("law_sha256") != digest_of_law(plan["law"]).get("law_sha256"):
+        raise RunError(f"{plan['law']}: is not that of the campaign")
     conditions: Conditions = decode(plan["conditions"], Conditions, "conditions")
     line = stored["scene"].encode()
     scenario = None

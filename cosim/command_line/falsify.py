@@ -67,5 +67,6 @@ def _search(options: argparse.Namespace) -> Any:
         raise RunError(f"{what}: is a file of scenes, expected a family ({', '.join(FAMILIES)}) or a scenario")
     vary = vary_from(options.vary)
     refuse_both(vary, options.set)
-    law = [f"law.name={options.law}"] if options.law else []
+    key = "file" if (options.law or "").endswith(".fmu") else "name"
+    law = [f"law.{key}={options.law}"] if options.law else []
     return ScenarioSearch(load_scenario(what, [*law, *options.set]), vary, settings)

@@ -79,7 +79,7 @@ class _Flight:
         calls = plant_calls(self.scenario.vehicle, plant.native(inputs, outputs), plant.native)
         self.law = law_of(self.scenario)
         self.model = make_model(self.scenario, self.law, for_record=True)
-        signals = step_signals(self.scenario, self.law, inputs, outputs)
+        signals = self._signals = step_signals(self.scenario, self.law, inputs, outputs)
         noise = NoiseSource(self.scenario, 1 + self.scenario.steps // self.scenario.control_every, rng)
         noise.draw(len(noise.values))
         self.data = make_data(self.scenario, self.model, self.law, signals, inputs, outputs, noise.values)
@@ -94,7 +94,7 @@ class _Flight:
 
     def advance_by_law(self) -> None:
         """Advance a control period with the forces of the scenario's law."""
-        self._bound_law = self._bound_law or BoundLaw(self.law, self.model, self.data)
+        self._bound_law = self._bound_law or BoundLaw(self.law, self.model, self.data, self._signals)
         self.data.manual = False
         self.period.call()
         self.data.manual = True

@@ -49,7 +49,7 @@ def contents_of(run: Run) -> dict[str, Any]:
         "isolated": format_isolations(run.summary) or "none",
         "limited": math.isfinite(s.limit.force) or s.limit.time_constant > 0.0,
         "log": _log(run),
-        "repeatable": not s.log and not s.law.is_custom and s.law.name in LAWS,  # by ``cosim run`` from the folder
+        "repeatable": not s.log and (s.law.fmu is not None or s.law.name in LAWS),  # by ``cosim run`` from the folder
     }
 
 

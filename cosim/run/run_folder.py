@@ -23,7 +23,7 @@ from cosim.results.log_facts import IMPORT
 from cosim.results.record import RECORD, STREAM, load_record, require_utf8
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import COMMANDS_LOG, REPLAY, REPORT, SCENARIO, SUMMARY, Run, load_run, open_run
-from cosim.scenario.scenario import VEHICLE_COPY, Scenario
+from cosim.scenario.scenario import VEHICLE_COPY, Scenario, files_of
 from plant_fmu.archive import is_temporary, temporary_folder
 
 _OUTPUT_NAMES = frozenset(
@@ -53,9 +53,8 @@ class RunFolder:
 
     def discard(self) -> None:
         """Remove all files of the run. May be called twice."""
-        for file in list(self.path.iterdir()) if self.path.exists() else ():
-            if file.name in _OUTPUT_NAMES:
-                _remove(file)
+        for file in _files_of_run(self.path) if self.path.exists() else ():
+            _remove(file)
         if self.created:
             with contextlib.suppress(OSError):  # the folder is not empty: its user has put files there
                 self.path.rmdir()
@@ -104,10 +103,9 @@ def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunF
         folder = RunFolder(path, created)
         try:
             path.mkdir(parents=True, exist_ok=True)
-            with (path / SCENARIO).open("x", encoding="utf-8") as file:
-                file.write(scenario.toml(VEHICLE_COPY if scenario.vehicle_file else None))
-            if scenario.vehicle_file:
-                shutil.copyfile(scenario.vehicle_file, path / VEHICLE_COPY)
+            for name, content in files_of(scenario).items():
+                with (path / name).open("xb") as file:
+                    file.write(content)
         except FileExistsError as error:  # another run has claimed the folder meanwhile
             raise RunError(f"{path}: is taken by another run") from error
         except BaseException:
@@ -116,6 +114,17 @@ def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunF
     except OSError as error:
         raise RunError(f"{where}: {error.strerror or error}") from error
     return folder
+
+
+def _files_of_run(path: Path) -> list[Path]:
+    """Return the files and folders of a run in its folder: with the FMUs that its scenario names."""
+    scenario = path / SCENARIO
+    text = scenario.read_text(encoding="utf-8") if scenario.is_file() else ""
+    return [
+        file
+        for file in path.iterdir()
+        if file.name in _OUTPUT_NAMES or (file.suffix == ".fmu" and f'file = "{file.name}"' in text)
+    ]
 
 
 def _remove(file: Path) -> None:
@@ -127,10 +136,11 @@ def _remove(file: Path) -> None:
 
 def _remove_run(path: Path) -> None:
     """Remove the files of a run from its folder; raise a RunError if the folder holds any other file."""
+    files = _files_of_run(path)
     odd = sorted(
         file.name
         for file in path.iterdir()
-        if not (file.name in _OUTPUT_NAMES or file.match("report*.*") or is_temporary(file.name))
+        if not (file in files or file.match("report*.*") or is_temporary(file.name))
     )
     if odd or not (path / SCENARIO).is_file():
         what = f"{odd[0]!r}, which no run makes" if odd else "no run"

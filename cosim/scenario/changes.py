@@ -16,7 +16,7 @@ from plant_fmu.vehicle import Vehicle
 
 # keys that no title lists: texts, recording, reporting and commands; seeds, and the text of a named file
 _UNLISTED_TABLES = ("title", "changed", "compare", "intersection", "record", "commands")
-_UNLISTED_KEYS = ("sensing.seed", "plant.parameters.seed", "arbiter.text")
+_UNLISTED_KEYS = ("sensing.seed", "plant.parameters.seed", "arbiter.text", "law.digest")
 # keys of the computation, which a title lists behind those of the task
 _COMPUTATION = ("time.", "plant.fmi", "plant.substep", "arbiter.engine", "arbiter.points", "master.")
 _MAX_LISTED = 3  # changes that a title spells out

@@ -28,10 +28,13 @@ def law_of(scenario: Scenario) -> CompiledLaw:
 
 def require_builtin_law(scenario: Scenario) -> None:
     """Raise `RunError` if a scenario's law is a custom one, whose code is not in its file."""
+    known = ", ".join(sorted(LAWS))
+    if scenario.law.fmu:
+        raise RunError(f"law.file is {scenario.law.name!r}, expected here no FMU but law.name, one of {known}")
     if scenario.law.is_custom:
         raise RunError(
             f"law.name is {scenario.law.name!r}, a law of one's own, which no file holds: expected a run from Python, "
-            f"by run_scenario(..., law=...), or another law.name, one of {', '.join(sorted(LAWS))}"
+            f"by run_scenario(..., law=...), or another law.name, one of {known}"
         )
 
 

@@ -17,7 +17,7 @@ from controller.regions import Region
 from controller.regions.region_set import shape_entry
 from controller.regions.shape import Shape
 from controller.restoring import parameters
-from cosim.errors import ScenarioError
+from cosim.errors import RunError, ScenarioError
 from cosim.scenario.arbiter_rules import ArbiterRules, check_rules, read_rules
 from cosim.scenario.changes import changed_keys, differing_keys, join_keys, shown_title, with_values
 from cosim.scenario.criteria import PAPER, CriterionSetup, check_criteria, check_criteria_of_regions, fill_criteria
@@ -44,6 +44,7 @@ from cosim.scenario.tables import (
 from cosim.scenario.toml_file import flatten, list_scenarios, override, read_table, rename_former_keys, set_key
 from cosim.scenario.toml_text import scenario_text
 from cosim.scenario.validation import (
+    check_digest,
     check_goal,
     check_intersection,
     check_law,
@@ -279,6 +280,22 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = (), impor
         raise ScenarioError(f"{text}: {error}") from error
 
 
+def table_of_files(scenario: Scenario) -> dict[str, Any]:
+    """Return the table of a scenario, with the names of the copies in `files_of`."""
+    law = scenario.table["law"] | ({"file": scenario.law.name} if scenario.law.fmu else {})
+    return scenario.table | {"law": law} | ({"vehicle": VEHICLE_COPY} if scenario.vehicle_file else {})
+
+
+def files_of(scenario: Scenario) -> dict[str, bytes]:
+    """Return the files that repeat a scenario, by name: its own, and copies of those that it names."""
+    sources = {VEHICLE_COPY: scenario.vehicle_file, scenario.law.name: scenario.law.fmu and scenario.law.fmu.file}
+    try:
+        copies = {name: source.read_bytes() for name, source in sources.items() if source}
+    except OSError as error:
+        raise RunError(f"{error.filename}: {error.strerror or error}") from error
+    return {"scenario.toml": scenario_text(table_of_files(scenario), {}).encode()} | copies
+
+
 def to_scenario(scenario: Scenario | str | Path) -> Scenario:
     """Return a scenario itself, or load it by its name or file."""
     return scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
@@ -303,9 +320,10 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
 def read_tables(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> File:
     """Check each table of a scenario's file, and fill in the defaults."""
     table = with_quaternions(rename_former_keys(table))
-    plant = table.get("plant")
-    if isinstance(plant, dict) and isinstance(plant.get("parameters"), dict):
-        table = table | {"plant": plant | {"parameters": flatten(plant["parameters"])}}
+    for key, names in (("plant", ("parameters",)), ("law", ("inputs", "outputs", "parameters"))):
+        if isinstance(entry := table.get(key), dict):
+            flat = {name: flatten(entry[name]) for name in names if isinstance(entry.get(name), dict)}
+            table = table | {key: entry | flat}
     for key in table.keys() - File.__struct_fields__:
         raise ScenarioError(f"{key}: unknown key; {hint_of_key(key, table.get('vehicle'))}")
     file: File = decode(table, File)
@@ -314,7 +332,7 @@ def read_tables(table: dict[str, Any], name: str, vehicle: Vehicle | None = None
         file,
         title=file.title or name,
         plant=msgspec.structs.replace(file.plant, parameters=parameters),
-        law=msgspec.structs.replace(file.law, gains=file.law.setup.gains._asdict()),
+        law=msgspec.structs.replace(file.law, gains=file.law.setup.gains._asdict(), digest=check_digest(file.law)),
         criteria=fill_criteria(file.criteria),
         arbiter=read_rules(file.arbiter),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 import msgspec
@@ -231,6 +232,17 @@ class Time(Table, frozen=True):
             msgspec.structs.force_setattr(self, name, getattr(self, name) or self.step)
 
 
+class UserFmu(NamedTuple):
+    """A co-simulation FMU of the user's, with the map between its variables and the signals of a run."""
+
+    key: str  # table of the scenario that names it, such as "law"
+    file: Path
+    inputs: dict[str, str]  # signal of each of its inputs; inputs that are not named have that of their own name
+    outputs: dict[str, str]  # likewise what each of its outputs sets
+    parameters: dict[str, float | bool | str]
+    timeout: float  # s of the wall clock
+
+
 class NoGains(NamedTuple):
     """Gains of a custom law in a scenario: none."""
 
@@ -242,10 +254,11 @@ class LawSetup:
     name: str  # one of controller.LAWS; with a colon: source of a custom law, such as mine.py:steer
     desired_quaternion: Vector4  # attitude to be kept, body to world, scalar first
     gains: Any  # gains of that law's gains_type; `NoGains` for a custom law
+    fmu: UserFmu | None = None
 
     @property
     def is_custom(self) -> bool:
-        """True if it is a custom law, whose code is not in the file."""
+        """True if it is none of `controller.LAWS`: an FMU, or a law of Python, whose code is not in the file."""
         return isinstance(self.gains, NoGains)
 
 
@@ -271,10 +284,31 @@ class LawEntry(Table, frozen=True):
             default="the law's own",
         ),
     ] = msgspec.field(default_factory=dict)
+    file: Annotated[str, key("FMU [of one's own](howto/your-fmu.md), beside the file that names it")] = ""
+    inputs: Annotated[dict[str, str], key("signal for each of its inputs", default="those of equal names")] = (
+        msgspec.field(default_factory=dict)
+    )
+    outputs: Annotated[dict[str, str], key("what each of its outputs sets", default="those of equal names")] = (
+        msgspec.field(default_factory=dict)
+    )
+    parameters: Annotated[dict[str, float | bool | str], key("values of its parameters", default="its own")] = (
+        msgspec.field(default_factory=dict)
+    )
+    timeout: Annotated[Positive, key("a step of it that takes longer ends the process", "s of the wall clock")] = 10.0
+    digest: Annotated[str, key("its SHA-256", more="; runs write it into their folder", default="not checked")] = ""
 
     def __post_init__(self) -> None:
-        require_text("name", self.name)
         _require_unit("desired_quaternion", self.desired_quaternion)
+        if self.file:
+            file = Path(self.file)
+            require(file.suffix == ".fmu", "file", repr(file.name), "a name that ends in .fmu")
+            require(self.name in ("ismail_dunnigan", file.name), "name", repr(self.name), "none beside file")
+            msgspec.structs.force_setattr(self, "name", file.name)
+        for field in ("inputs", "outputs", "parameters", "digest"):
+            require(
+                bool(self.file or not getattr(self, field)), field, repr(getattr(self, field)), "none without law.file"
+            )
+        require_text("name", self.name)
         if self.is_custom:
             if self.gains:
                 raise ValueError(f"gains has {next(iter(self.gains))!r}, expected nothing with a law of one's own")
@@ -291,12 +325,13 @@ class LawEntry(Table, frozen=True):
     def setup(self) -> LawSetup:
         """The law with all of its gains."""
         gains = NoGains() if self.is_custom else LAWS[self.name].gains_type(**self.gains)
-        return LawSetup(self.name, self.desired_quaternion, gains)
+        fmu = UserFmu("law", Path(self.file), self.inputs, self.outputs, self.parameters, self.timeout)
+        return LawSetup(self.name, self.desired_quaternion, gains, fmu if self.file else None)
 
     @property
     def is_custom(self) -> bool:
-        """True if the name is the source of a custom law, such as ``mine.py:steer``."""
-        return ":" in self.name
+        """True if it is an FMU, or if the name is the source of a custom law, such as ``mine.py:steer``."""
+        return bool(self.file) or ":" in self.name
 
 
 class File(Table, frozen=True):

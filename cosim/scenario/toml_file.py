@@ -71,11 +71,12 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
         vehicle = table.get("vehicle")
         if isinstance(vehicle, str) and vehicle.endswith(".toml"):  # relative to the file that names it
             table["vehicle"] = str(folder / vehicle)
-        arbiter = table.get("arbiter")
-        if isinstance(arbiter, dict) and not arbiter.get("text"):
-            rules = arbiter.get("file")
-            if rules and isinstance(rules, str):  # likewise
-                arbiter["file"] = str(folder / rules)
+        arbiter, law = table.get("arbiter"), table.get("law")
+        for holder in (arbiter, law):
+            if isinstance(holder, dict) and not holder.get("text"):
+                file = holder.get("file")
+                if file and isinstance(file, str):  # likewise
+                    holder["file"] = str(folder / file)
     elif name_or_file in list_scenarios():
         with resources.as_file(_folder() / f"{name_or_file}.toml") as shipped:
             table, name, folder = read_toml(shipped), name_or_file, Path()
@@ -89,8 +90,8 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
             raise ScenarioError(f"{name}: base is {base!r}, expected the name of a scenario")
         below, _, titled = read_table(base, (*seen, name_or_file), folder)
         law = table.get("law")
-        if isinstance(law, dict) and "name" in law:
-            _name_law(below, law["name"])
+        if isinstance(law, dict) and (law.get("file") or "name" in law):
+            _name_law(below, law.get("name"), law.get("file"))
         arbiter = table.get("arbiter")
         if isinstance(arbiter, dict) and "file" in arbiter:
             _name_rules(below)
@@ -102,11 +103,16 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
     return ScenarioTable(table, name, copy.deepcopy(table))
 
 
-def _name_law(table: dict[str, Any], name: object) -> None:
-    """Set the law's name in a table, and drop the gains of another law."""
+def _name_law(table: dict[str, Any], name: object, file: object = "") -> None:
+    """Set the law's name or FMU in a table, and drop what belongs to another law."""
     law = table.setdefault("law", {})
-    if isinstance(law, dict) and law.get("name", "ismail_dunnigan") != name:
+    if isinstance(law, dict) and file:
+        law.pop("name", None)
         law.pop("gains", None)
+        law.pop("digest", None)
+    elif isinstance(law, dict) and law.get("name", "ismail_dunnigan") != name:
+        for key in ("gains", "file", "inputs", "outputs", "parameters", "digest"):
+            law.pop(key, None)
         law["name"] = name
 
 
@@ -189,6 +195,8 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
     *path, last = key.split(".")
     if key == "law.name":
         _name_law(table, value)
+    if key == "law.file":
+        _name_law(table, None, value)
     if key == "arbiter.file":
         _name_rules(table)
     node: Any = table

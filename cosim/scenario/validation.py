@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import functools
+import hashlib
 import math
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -134,7 +137,8 @@ def obstacle_slots(file: File) -> tuple[SecondaryRegion, ...]:
         return ()
     law = file.law
     _require(not file.record.lyapunov, "record.lyapunov", "true", "false with commands.enabled: V is of one target")
-    _require(not law.is_custom, "commands.enabled", "true", f"false with {law.name}: only built-in laws take commands")
+    of_python = law.is_custom and not law.file
+    _require(not of_python, "commands.enabled", "true", f"false with {law.name}: laws of Python take no commands")
     slots = [f"seen {i}" for i in range(1, commands.obstacles + 1)]
     for i, entry in enumerate(file.regions):
         _require(
@@ -162,6 +166,28 @@ def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_
         raise ScenarioError(f"actuation.through is {through!r}, expected 'thrusters': law {entry.name!r} drives them")
     law.for_vehicle(vehicle_model(vehicle), setup.gains, np.array(entry.desired_quaternion), period, n_regions)
     return setup
+
+
+def check_digest(entry: LawEntry) -> str:
+    """Return the digest of a law's FMU, which has to be the one that the table states; "" without an FMU."""
+    if not entry.file:
+        return ""
+    try:
+        path = Path(entry.file)
+        if not path.is_file():
+            raise FileNotFoundError(errno.ENOENT, "No such file")
+        status = path.stat()
+        digest = _digest(path, status.st_mtime_ns, status.st_size)
+    except OSError as error:
+        raise ScenarioError(f"law.file: {entry.file}: {error.strerror or error}") from error
+    if entry.digest not in ("", digest):
+        raise ScenarioError(f"law.file: {path.name} has the digest {digest[:12]}..., expected {entry.digest[:12]}...")
+    return digest
+
+
+@functools.lru_cache(maxsize=8)
+def _digest(path: Path, modified: int, size: int) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def steps_per_period(key: str, period: float, step: float) -> int:

@@ -17,7 +17,10 @@ from controller.compiling.function import INTERPRETED, BoundCall
 from controller.compiling.library import load_library
 from controller.errors import CompilationError, LawError
 from controller.function_law import qualified_name
-from cosim.simulation.signals import Array
+from cosim.scenario.law_factory import law_of
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.fmu_law import FmuLaw
+from cosim.simulation.signals import Array, Signals
 from cosim.step.step_model import ARBITER, LAW, LawOutputs, StepData, StepModel, set_call
 from fuzzy_arbiter import Arbiter, System
 from fuzzy_arbiter.export import to_c
@@ -44,6 +47,8 @@ def outputs_of(law: Law) -> LawOutputs:
     """Return arrays of a law's outputs: its own, or those that a step in Python fills."""
     if is_compiled(law):
         return LawOutputs(law.estimate, law.expected, law.report)
+    if isinstance(law, FmuLaw):
+        return LawOutputs(law.estimate, np.full(6, np.nan), law.report)
     return LawOutputs(np.zeros(4), np.full(6, np.nan), np.zeros(len(law.diagnostics)))
 
 
@@ -56,8 +61,9 @@ def law_arguments(model: StepModel, data: StepData) -> tuple[Any, ...]:
 class BoundLaw:
     """Binds a law to the arrays of a step."""
 
-    def __init__(self, law: Law, model: StepModel, data: StepData) -> None:
+    def __init__(self, law: Law, model: StepModel, data: StepData, signals: Signals) -> None:
         self.law, self._data, self._arguments = law, data, law_arguments(model, data)
+        self._model, self._signals = model, signals
         self._gains: Any = self  # no gains yet
         self._memory = getattr(law, "memory", None)
         self.compiled = is_compiled(law)
@@ -74,9 +80,20 @@ class BoundLaw:
         if self.compiled:
             assert isinstance(self.law, CompiledLaw)
             self._call = self.law.bound(*self._arguments)
+        elif isinstance(self.law, FmuLaw):
+            self._call = self.law.bind(self._model, data, self._signals, self._arguments[-1])
         else:
             self._call = BoundCall(_PythonStep(self.law, data), self._arguments)
         set_call(data, LAW, self._call)
+
+    def reset(self, scenario: Scenario) -> None:
+        """Let the law begin again."""
+        if isinstance(self.law, FmuLaw):
+            self.law.restart(scenario)
+            self._gains = self
+            self.refresh()  # a new instance of the FMU has other addresses
+        else:
+            self.restart(law_of(scenario))
 
     def restart(self, fresh: CompiledLaw) -> None:
         """Give the law the numbers of another law's memory."""
@@ -88,6 +105,8 @@ class BoundLaw:
     def raise_error(self) -> None:
         """Raise the error of the law's last step, if it raised one."""
         self._call.raise_error()
+        if isinstance(self.law, FmuLaw):
+            self.law.raise_error()
 
 
 class _PythonStep:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Sequence
 from types import TracebackType
@@ -15,7 +16,7 @@ import numpy as np
 from controller import CompiledLaw, Law
 from controller.compiling.function import BoundCall, load_functions
 from controller.quaternion import from_axis_angle
-from cosim.scenario.law_factory import law_of, with_custom_law
+from cosim.scenario.law_factory import with_custom_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.actuation_limits import ActuationLimits
@@ -25,6 +26,7 @@ from cosim.simulation.commands.command_handler import CommandHandler
 from cosim.simulation.commands.commands import Command
 from cosim.simulation.commands.sources import CommandSource
 from cosim.simulation.environment import RegionEnvironment
+from cosim.simulation.fmu_law import FmuLaw, make_law
 from cosim.simulation.lyapunov_signals import LyapunovSignals
 from cosim.simulation.make_step import NoiseSource, make_data, make_model
 from cosim.simulation.pace import Pace
@@ -112,19 +114,24 @@ class Master:
             validate_plant(plant, scenario.vehicle)
         self.scenario = scenario
         self._arbiter = Arbiter(scenario.rules.system, engine=scenario.arbiter.engine)
-        self._law: Law = law_of(scenario) if law is None else law
         self._boundary = 0.0  # s, beginning of the next step
 
-        self.plant: SteppedPlant = make_plant(scenario, self._law) if plant is None else plant
+        self._open = contextlib.ExitStack()
         try:
+            self._law: Law = make_law(scenario) if law is None else law
+            if isinstance(self._law, FmuLaw):
+                self._open.callback(self._law.close)
             if plant is not None:
+                self._open.callback(plant.close)
                 load_functions(*step_functions(scenario, self._law))
+            self.plant: SteppedPlant = make_plant(scenario, self._law) if plant is None else plant
+            self._open.callback(self.plant.close)
             self.plant.set(start_values(scenario))
             self.plant.initialize()
             self.signals = Signals(columns_of(scenario, self.plant, self.law))
             self._bind(own_plant=plant is None)
         except BaseException:
-            self.plant.close()
+            self.close()
             raise
 
     def _bind(self, own_plant: bool) -> None:
@@ -143,7 +150,7 @@ class Master:
         self._rows: Array = np.zeros((_BLOCK, s.row.size))
         arguments = self.model, self.data, self._plant.calls
         block = *arguments, self._span, self._rows
-        self._bound_law = BoundLaw(self.law, self.model, self.data)
+        self._bound_law = BoundLaw(self.law, self.model, self.data, s)
         self._parts: list[_Raising] = [self._bound_law, bind_arbiter(self.arbiter, self.data), self._plant]
         self._advance_one = BoundCall(advance, (*arguments, self._span, self._rows[:0]))
         self._advance_block = BoundCall(advance, block)
@@ -343,7 +350,7 @@ class Master:
         for command in commands:
             command_handler.apply(command, float(self.data.now))
         if command_handler.control_regained:
-            self._bound_law.restart(law_of(self.scenario))
+            self._bound_law.reset(self.scenario)
         if isinstance(self.law, CompiledLaw) and (
             command_handler.control_regained or command_handler.changed or command_handler.turned
         ):
@@ -378,8 +385,8 @@ class Master:
         self.environment.move(name, displacement, velocity, self._boundary)
 
     def close(self) -> None:
-        """Free the FMU. May be called twice."""
-        self.plant.close()
+        """Free the FMUs. May be called twice."""
+        self._open.close()
 
     def __enter__(self) -> Master:
         return self

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cosim.errors import RunError
 from cosim.scenario.law_factory import require_builtin_law
-from cosim.scenario.scenario import VEHICLE_COPY, Scenario
+from cosim.scenario.scenario import Scenario, files_of
 from cosim.scenario.start_values import start_values
 from cosim.ssp.arbiter import arbiter_component
 from cosim.ssp.controller import controller_component
@@ -61,7 +61,8 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
         members[f"resources/{component.name}_OspModelDescription.xml"] = groups.encode()
     description = structure(scenario.name, scenario.title, parts, wires, time.duration, time.step)
     members["SystemStructure.ssd"] = description.encode()
-    write_archive(out, members | _origin(scenario))
+    origin = {f"documentation/{name}": content for name, content in files_of(scenario).items()}
+    write_archive(out, members | origin)
     return out
 
 
@@ -95,16 +96,6 @@ def plant_component(scenario: Scenario) -> Component:
             start[f"thrust_effectiveness[{failure.thruster}]"] = failure.effectiveness
     coupled = bool(scenario.failures or scenario.outages)
     return make_vehicle_component(scenario.vehicle, start, scenario.time.duration, scenario.time.step, coupled)
-
-
-def _origin(scenario: Scenario) -> dict[str, bytes]:
-    """Return the scenario's files, from which the system can be built again."""
-    if scenario.vehicle_file is None:
-        return {"documentation/scenario.toml": scenario.toml().encode()}
-    return {
-        "documentation/scenario.toml": scenario.toml(VEHICLE_COPY).encode(),
-        f"documentation/{VEHICLE_COPY}": scenario.vehicle_file.read_bytes(),
-    }
 
 
 def _fmu(component: Component, fmi: int, platforms: str) -> bytes:

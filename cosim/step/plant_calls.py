@@ -1,4 +1,4 @@
-"""Calls of C functions by address in a step: those of an FMI 3.0 FMU, and the clock."""
+"""Calls of C functions by address in a step: those of an FMU, and the clock."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ _ENDED, _STATUS = 1, 4  # indices of terminateSimulation, and of the status, in 
 # arguments of the C functions
 _TRANSFER = (POINTER, POINTER, SIZE, POINTER, SIZE)  # fmi3SetFloat64, fmi3GetFloat64
 _DO_STEP = (POINTER, DOUBLE, DOUBLE, BOOL, POINTER, POINTER, POINTER, POINTER)  # fmi3DoStep
+_TRANSFER_2 = (POINTER, POINTER, SIZE, POINTER)  # fmi2SetReal, fmi2GetReal
+_DO_STEP_2 = (POINTER, DOUBLE, DOUBLE, INT)  # fmi2DoStep
 _CLOCK_GETTIME, _QUERY_COUNTER = (INT, POINTER), (POINTER,)
 
 
@@ -31,30 +33,32 @@ class PlantCalls(NamedTuple):
 
 def fmi_set(native: Native) -> bool:
     """Set the inputs; return True unless the FMU fails."""
-    return _transfer(native.set_values, native.instance, native.input_references, native.inputs)
+    return _transfer(native, native.set_values, native.input_references, native.inputs)
 
 
 def fmi_set_one(native: Native, i: int) -> bool:
     """Set one of the inputs; return True unless the FMU fails."""
-    return _transfer(native.set_values, native.instance, native.input_references[i : i + 1], native.inputs[i : i + 1])
+    return _transfer(native, native.set_values, native.input_references[i : i + 1], native.inputs[i : i + 1])
 
 
 def fmi_get(native: Native) -> bool:
     """Get the outputs; return True unless the FMU fails."""
-    return _transfer(native.get_values, native.instance, native.output_references, native.outputs)
+    return _transfer(native, native.get_values, native.output_references, native.outputs)
 
 
 def fmi_get_flags(native: Native) -> bool:
     """Get the Boolean outputs; return True unless the FMU fails."""
-    return native.flags.size == 0 or _transfer(native.get_flags, native.instance, native.flag_references, native.flags)
+    return native.flags.size == 0 or _transfer(native, native.get_flags, native.flag_references, native.flags)
 
 
-def _transfer(function: int, instance: int, references: NDArray[np.uint32], values: NDArray[Any]) -> bool:
+def _transfer(native: Native, function: int, references: NDArray[np.uint32], values: NDArray[Any]) -> bool:
     """Call a function that sets or gets variables; return True unless the FMU fails, or for a plant in Python."""
-    if function == 0:
-        return True
     n = references.size
-    return call_c(function, _TRANSFER, instance, references, n, values, n) <= _WARNING
+    if function == 0 or n == 0:  # some FMUs refuse a call without variables
+        return True
+    if native.fmi == 2:
+        return call_c(function, _TRANSFER_2, native.instance, references, n, values) <= _WARNING
+    return call_c(function, _TRANSFER, native.instance, references, n, values, n) <= _WARNING
 
 
 def fmi_do_step(native: Native, now: float, step: float) -> bool:
@@ -64,7 +68,10 @@ def fmi_do_step(native: Native, now: float, step: float) -> bool:
     out = native.results
     if native.do_step == 0:
         return True
-    status = call_c(native.do_step, _DO_STEP, native.instance, now, step, True, out, out[1:], out[2:], out[3:])
+    if native.fmi == 2:
+        status = call_c(native.do_step, _DO_STEP_2, native.instance, now, step, 1)
+    else:
+        status = call_c(native.do_step, _DO_STEP, native.instance, now, step, True, out, out[1:], out[2:], out[3:])
     out[_STATUS] = status
     return status <= _WARNING and out[_ENDED] == 0
 

@@ -230,6 +230,9 @@ class CoSimulationInstance:
     def raise_failure(self, results: NDArray[np.int64]) -> NoReturn:
         """Raise the error of a step by the functions of `native_channels`, or that the FMU ends after it."""
         ended, status = bool(results[1]), int(results[4])
+        self._now.value, self._ended.value, self._last.value = self.time, ended, float(results[3:4].view(np.float64)[0])
+        if status == _DISCARD:
+            self._fail_step(status)
         self.count_steps(int(ended))
         if ended:
             raise PlantError(f"t = {self.time:.6g} s: {_ENDS}")

@@ -17,14 +17,14 @@ _NO_FLAGS = np.empty(0, np.bool_)
 
 
 class Native(NamedTuple):
-    """An FMI 3.0 instance for callers in C: addresses of C functions, and the buffers that they read and fill."""
+    """An instance for callers in C: addresses of C functions, and the buffers that they read and fill."""
 
     # It is valid while the plant is open, and only one caller may step at a time.
 
     instance: int  # first argument of every function
-    set_values: int  # fmi3SetFloat64
-    get_values: int  # fmi3GetFloat64
-    do_step: int  # fmi3DoStep
+    set_values: int  # fmi3SetFloat64, or fmi2SetReal
+    get_values: int  # likewise
+    do_step: int
     input_references: NDArray[np.uint32]  # (n,) value references of the inputs
     inputs: NDArray[np.float64]  # (n,) values sent by set_values
     output_references: NDArray[np.uint32]  # (m,) value references of the outputs
@@ -32,14 +32,15 @@ class Native(NamedTuple):
     results: NDArray[np.int64]  # (5,) results of fmi3DoStep by pointer, each at the first byte of its element; status
     get_flags: int = 0  # fmi3GetBoolean
     flag_references: NDArray[np.uint32] = _NO_REFERENCES  # (f,) value references of the Boolean outputs
-    flags: NDArray[np.bool_] = _NO_FLAGS  # (f,) values filled in by get_flags
+    flags: NDArray[np.bool_] = _NO_FLAGS  # (f,) values filled in by get_flags; none of FMI 2.0
+    fmi: int = 3  # FMI version, 2 or 3
 
 
 def native_calls(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str, ...],
                  flags: tuple[str, ...] = ()) -> Native:  # fmt: skip
     """Return the addresses of an instance's C functions, with buffers."""
-    if instance.fmi != 3:
-        raise PlantError(f"{instance.path}: FMI {instance.fmi}.0, expected 3.0 for compiled stepping")
+    if instance.fmi == 2 and flags:
+        raise PlantError(f"{instance.path}: FMI 2.0, expected 3.0 for compiled stepping with Boolean outputs")
     library: Any = instance.fmu.dll
 
     def address(name: str) -> int:
@@ -47,17 +48,18 @@ def native_calls(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str
 
     return Native(
         instance=ctypes.cast(instance.fmu.component, ctypes.c_void_p).value or 0,
-        set_values=address("fmi3SetFloat64"),
-        get_values=address("fmi3GetFloat64"),
-        do_step=address("fmi3DoStep"),
+        set_values=address("fmi3SetFloat64" if instance.fmi == 3 else "fmi2SetReal"),
+        get_values=address("fmi3GetFloat64" if instance.fmi == 3 else "fmi2GetReal"),
+        do_step=address(f"fmi{instance.fmi}DoStep"),
         input_references=_references(instance, inputs),
         inputs=np.zeros(len(inputs)),
         output_references=_references(instance, outputs),
         outputs=np.zeros(len(outputs)),
         results=np.zeros(5, np.int64),
-        get_flags=address("fmi3GetBoolean"),
+        get_flags=address(f"fmi{instance.fmi}GetBoolean"),
         flag_references=_references(instance, flags, ("Boolean",)),
         flags=np.zeros(len(flags), np.bool_),
+        fmi=instance.fmi,
     )
 
 

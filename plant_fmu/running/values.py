@@ -14,7 +14,7 @@ from plant_fmu.running.channels import DOUBLES
 
 Value = float | int | bool | str
 
-_ROUNDING = 1e-9  # how far outside of its range a value may be, relative to the bound if that is above one
+_ROUNDING = 1e-9  # how far outside of its range a value may be, relative to the bound unless that is 0
 _REALS = (*DOUBLES, "Float32")
 _INTEGERS = {  # number of bits of each type of whole numbers, and True if signed
     "Integer": (32, True),
@@ -66,7 +66,7 @@ def _clip(variable: ModelVariable, value: float) -> float:
         with contextlib.suppress(ValueError):  # there is none, or it is no number
             number = float(bound)
             is_beyond = value < number if bound is variable.minimum else value > number
-            if is_beyond and abs(value - number) <= _ROUNDING * max(1.0, abs(number)):
+            if is_beyond and abs(value - number) <= _ROUNDING * (abs(number) or 1.0):
                 return number
     return value
 

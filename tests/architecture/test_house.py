@@ -23,6 +23,7 @@ PROCESSES = {
     "plant_fmu/compiling/compiler.py",
     "plant_fmu/checking/process.py",
     "cosim/identification/shooting.py",
+    "cosim/simulation/watchdog.py",
 }
 ZIPS = {
     "plant_fmu/unpacking.py",

@@ -27,12 +27,17 @@ _LISTED = 3  # number of worst scenes listed for each law, unless more have repl
 _SEEN = ("reach_time", "min_clearance")  # columns that are drawn scene by scene
 
 
+def _is_law(name: str) -> bool:
+    """Return True for a law's name, or that of a file without a folder."""
+    return name in LAWS or (Path(name).name == name and Path(name).suffix in (".fmu", ".toml"))
+
+
 def write_comparison_page(folder: Path, replays: int) -> Path:
     """Write ``compare.html`` and its figures, and replays of each law's worst scenes, with all laws on one page."""
 
     def compute(numbers: dict[str, Any]) -> PageContents:
         laws = numbers.get("laws")
-        if not (isinstance(laws, dict) and laws and laws.keys() <= LAWS.keys()):
+        if not (isinstance(laws, dict) and laws and all(map(_is_law, laws))):
             raise RunError(f"{folder / NUMBERS}: holds no comparison of laws")
         results = {law: complete_results(folder / law, SCHEMA) for law in laws}
         worst = [

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from controller.regions.region_set import name_of
 from cosim.campaigns.scenes.conditions import Conditions
+from cosim.campaigns.scenes.law_gains import law_table
 from cosim.campaigns.scenes.scenario_scene import AnyScene, ScenarioScene
 from cosim.campaigns.scenes.scene import Scene, plant_parameters, scene_regions
 from cosim.campaigns.scenes.scene_tables import sphere_table
@@ -20,8 +22,9 @@ VEHICLE = "odin"  # vehicle of scenes that name none
 
 def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions) -> Scenario:
     """Convert a scene to a scenario."""
+    name = f"{Path(law).name}-scene-{scene.seed}"
     if isinstance(scene, ScenarioScene):
-        return scene.with_law(law, gains._asdict(), _changes(scene, conditions))
+        return scene.with_law(law_table(law, gains), name, _changes(scene, conditions))
     vehicle = load_vehicle(VEHICLE)
     table = {
         "title": f"Scene {scene.seed}",
@@ -39,7 +42,7 @@ def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions
         },
         "initial": {"position": scene.start},
         "goal": sphere_table(scene.goal.centre, scene.goal.radius),
-        "law": {"name": law, "gains": gains._asdict()},
+        "law": law_table(law, gains),
         "arbiter": conditions.arbiter_table({"ramp": conditions.ramp}),
         "actuation": {"through": "thrusters"},
         "sensing": _sensing(scene, conditions),
@@ -48,7 +51,7 @@ def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions
         "report_failures": conditions.report_failures,
         "regions": _regions(scene),
     }
-    return validate_scenario(table, f"{law}-scene-{scene.seed}", vehicle)
+    return validate_scenario(table, name, vehicle)
 
 
 def _changes(scene: ScenarioScene, conditions: Conditions) -> dict[str, Any]:

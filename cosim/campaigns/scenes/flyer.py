@@ -10,12 +10,13 @@ import numpy as np
 from cosim.batch.fused import fly_scenario
 from cosim.campaigns.scenes.as_scenario import VEHICLE, scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.law_gains import law_class
+from cosim.campaigns.scenes.law_gains import fmu_table, gains_from, law_class
 from cosim.campaigns.scenes.scenario_scene import AnyScene
 from cosim.results.record import Rows
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_vehicle
 from cosim.scenario.vehicle_model import vehicle_model
+from cosim.simulation.fmu_law import FmuLaw
 from cosim.step.plant_calls import Clock
 from cosim.step.score import FlightMetrics
 from plant_fmu import Plant
@@ -56,7 +57,7 @@ class SceneFlyer:
     Parameters
     ----------
     law : str
-        Name of the law, a key of `controller.LAWS`.
+        Name of the law, a key of `controller.LAWS`; or the file of an FMU.
     conditions : Conditions
         Conditions of all flights.
     gains : NamedTuple, optional
@@ -85,13 +86,14 @@ class SceneFlyer:
     """
 
     def __init__(self, law: str, conditions: Conditions | None = None, gains: Any = None) -> None:
-        of = law_class(law)
         self.law = law
         self.conditions = conditions or Conditions()
-        self.gains = of.gains_type() if gains is None else gains
+        self.gains = gains_from(law) if gains is None else gains
         vehicle = load_vehicle(VEHICLE)
-        model, level = vehicle_model(vehicle), np.array(_LEVEL)
-        of.for_vehicle(model, self.gains, level, self.conditions.control, 0)  # raises an error for invalid gains
+        if fmu_table(law) is None:
+            model, level = vehicle_model(vehicle), np.array(_LEVEL)
+            law_class(law).for_vehicle(model, self.gains, level, self.conditions.control, 0)  # refuses invalid gains
+        self._fmus: dict[str, FmuLaw] = {}  # the law for each vehicle
         self._clock = Clock()
         self._plants = {VEHICLE: Plant(vehicle)}
 
@@ -119,8 +121,14 @@ class SceneFlyer:
         """
         scenario = scene_scenario(scene, self.law, self.gains, self.conditions)
         plant = self._plant(scenario.vehicle)
-        metrics, _, _, signals = fly_scenario(plant, scenario, trace, self._clock.numbers)
+        metrics, _, _, signals = fly_scenario(plant, scenario, trace, self._clock.numbers, self._fmu_law(scenario))
         return self._score(metrics, scenario), signals
+
+    def _fmu_law(self, scenario: Scenario) -> FmuLaw | None:
+        name = scenario.vehicle.name
+        if scenario.law.fmu and name not in self._fmus:
+            self._fmus[name] = FmuLaw(scenario)
+        return self._fmus.get(name)
 
     def _plant(self, vehicle: Vehicle) -> Plant:
         if vehicle.name not in self._plants:
@@ -144,9 +152,11 @@ class SceneFlyer:
         )
 
     def close(self) -> None:
-        """Free the plant. May be called twice."""
+        """Free plants and laws. May be called twice."""
         for plant in self._plants.values():
             plant.close()
+        for law in self._fmus.values():
+            law.close()
 
     def __enter__(self) -> SceneFlyer:
         return self

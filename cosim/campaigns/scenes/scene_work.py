@@ -10,6 +10,7 @@ import numpy as np
 
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer
+from cosim.campaigns.scenes.law_gains import digest_of_law
 from cosim.campaigns.scenes.scene_file import SceneStore, decode_scene
 from cosim.campaigns.scenes.scene_rows import SCHEMA, refused_row, row_of, table_of
 from cosim.campaigns.store.plan import SCENES, code_digest, versions
@@ -37,6 +38,7 @@ class SceneTask:
             "kind": SCENES,
             "law": self.law,
             "gains": self.gains._asdict(),
+            **digest_of_law(self.law),
             "conditions": conditions | {"outages": list(conditions["outages"])},  # as JSON is read
             "scenes": scenes,
             "code_sha256": code_digest(),

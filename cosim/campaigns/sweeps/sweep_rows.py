@@ -20,8 +20,7 @@ from cosim.campaigns.store.results import make_schema, make_table
 from cosim.campaigns.sweeps.design import Design
 from cosim.campaigns.workers.work import Rows, Work
 from cosim.errors import RunError
-from cosim.results.run_result import SCENARIO
-from cosim.scenario.scenario import VEHICLE_COPY, Scenario
+from cosim.scenario.scenario import VEHICLE_COPY, Scenario, files_of, table_of_files
 
 _TYPES = {np.bool_: pa.bool_(), np.float64: pa.float64()}
 
@@ -101,12 +100,12 @@ class SweepWork(Work):
         self.name, self.design = scenario.name, design
         self.task = SweepTask(self.variation, FusedFlyer)
         self.schema = schema_of(keys)
-        self.files = _files(scenario)
+        self.files = files_of(scenario)
         self.plan = {
             "kind": SWEEP,
             "name": scenario.name,
             **design.table(),
-            "scenario": _for_json(scenario.table | ({"vehicle": VEHICLE_COPY} if scenario.vehicle_file else {})),
+            "scenario": _for_json(table_of_files(scenario)),
             "vehicle_sha256": sha256(self.files.get(VEHICLE_COPY, b"")).hexdigest(),
             "code_sha256": code_digest(),
             "versions": versions(),
@@ -122,17 +121,6 @@ class SweepWork(Work):
     def refused_table(self, row: int, reason: str) -> Any:
         """Return the table of one row that could not be flown."""
         return table_of(self.variation.keys, self.batch(np.array([row])), BatchResult(empty_outcomes(1), {0: reason}))
-
-
-def _files(scenario: Scenario) -> dict[str, bytes]:
-    """Return the files that repeat the scenario, by name."""
-    if scenario.vehicle_file is None:
-        return {SCENARIO: scenario.toml().encode()}
-    try:
-        vehicle = scenario.vehicle_file.read_bytes()
-    except OSError as error:
-        raise RunError(f"{scenario.vehicle_file}: {error.strerror or error}") from error
-    return {SCENARIO: scenario.toml(VEHICLE_COPY).encode(), VEHICLE_COPY: vehicle}
 
 
 def _for_json(value: Any) -> Any:

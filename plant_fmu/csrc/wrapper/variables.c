@@ -87,7 +87,7 @@ static unsigned modes_to_set(Role role)
     }
 }
 
-/* How far outside of its range a value may be, relative to the bound if that is above one: it is clipped. */
+/* How far outside of its range a value may be, relative to the bound unless that is 0: it is clipped. */
 static const double ROUNDING = 1e-9;
 
 static double clip(const Variable *v, double value)
@@ -108,7 +108,7 @@ static Status check_value(const Instance *instance, Type type, unsigned referenc
     if (!isfinite(value))
         return instance_refuse(instance, "%s = %g refused: not a finite number", v->name, isnan(value) ? fabs(value) : value);
     const double bounded = clip(v, value);
-    if (fabs(value - bounded) > ROUNDING * fmax(1.0, fabs(bounded)))
+    if (fabs(value - bounded) > ROUNDING * (bounded != 0.0 ? fabs(bounded) : 1.0))
         return instance_refuse(instance, "%s = %.17g refused: outside [%.17g, %.17g]", v->name, value, v->min, v->max);
     return STATUS_OK;
 }

@@ -1,0 +1,75 @@
+"""The step of an FMU of the user's: signals in, `doStep`, outputs out."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from cosim.step.plant_calls import fmi_do_step, fmi_get, fmi_set
+from cosim.step.step_model import Array, Integers, StepData, StepModel
+from plant_fmu.running.native import Native
+
+STEPS, BUSY, NOW, FAILED = range(4)  # indices in `FmuCalls.progress`
+N_OWN = 13  # number of signals of the measured motion, which come first
+
+
+class FmuCalls(NamedTuple):
+    """An FMU of the user's, and the map between its variables and the arrays of a step."""
+
+    native: Native  # inputs and outputs that are connected
+    period: float  # s, length of its steps
+    sources: Integers  # (i,) index in `signals` of each input
+    targets: Integers  # (o,) index among forces, estimate and report of each output
+    signals: Array  # measured motion (13), weights (n), values (n + 1), clearances (n + 1), gradients (3 n + 3), row
+    progress: Array  # (4,) steps done; 1 during a step; time of the run [s]; -1 for a failed step, else 1 + the output
+    # that is not finite
+
+
+def call_law(fmu: FmuCalls, model: StepModel, data: StepData, forces: Array) -> None:
+    """Let an FMU compute the forces of the coming control period."""
+    collect_signals(fmu.signals, model, data)
+    native, progress, n = fmu.native, fmu.progress, forces.size
+    for i in range(fmu.sources.size):
+        native.inputs[i] = fmu.signals[fmu.sources[i]]
+    progress[NOW] = data.now
+    progress[BUSY] = 1.0
+    ok = False
+    if fmi_set(native) and fmi_do_step(native, progress[STEPS] * fmu.period, fmu.period) and fmi_get(native):
+        ok = True
+    progress[BUSY] = 0.0
+    progress[STEPS] += 1.0
+    if not ok:
+        progress[FAILED] = -1.0
+        data.failed_step = data.k
+        return
+    for i in range(fmu.targets.size):
+        target, value = fmu.targets[i], native.outputs[i]
+        if target >= n + 4:
+            data.law.report[target - n - 4] = value
+        elif target >= n:
+            data.law.estimate[target - n] = value
+            data.estimate[target - n] = value  # the FMU gives that with which it made the forces
+        elif math.isfinite(value):
+            forces[target] = value
+        elif progress[FAILED] == 0.0:
+            progress[FAILED] = 1.0 + i
+            data.failed_step = data.k
+
+
+def collect_signals(signals: Array, model: StepModel, data: StepData) -> None:
+    """Copy what a law receives, and the row, side by side."""
+    state, n = data.state, data.weights.size
+    signals[:3], signals[3:7], signals[7:13] = state.position, state.quaternion, state.velocity_body
+    signals[13 : 13 + n] = data.weights
+    first, m = 13 + n, n + 1
+    for i in range(m):
+        if model.exact:
+            signals[first + i] = data.true_evaluation.values[i]
+            signals[first + m + i] = data.true_evaluation.clearances[i]
+            signals[first + 2 * m + 3 * i : first + 2 * m + 3 * i + 3] = data.true_evaluation.gradients[i]
+        else:
+            signals[first + i] = data.arbiter_evaluation.values[i]
+            signals[first + m + i] = data.arbiter_evaluation.clearances[i]
+            signals[first + 2 * m + 3 * i : first + 2 * m + 3 * i + 3] = data.arbiter_evaluation.gradients[i]
+    first += 5 * m
+    signals[first:] = data.row
