@@ -1,4 +1,4 @@
-"""``cosim mavlink listen`` and ``cosim mavlink stream``."""
+"""``cosim mavlink``: listen, stream, hold and resume."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import contextlib
 import math
 import shutil
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,17 +18,18 @@ from cosim.command_line.process import print_status, say
 
 _REDRAW, _SNAPSHOT = 0.25, 1.0  # s between pictures, on a terminal and elsewhere
 _ONCE = 2.0  # s of listening, for one picture
+_ATTEMPTS, _ANSWER_TIMEOUT = 5, 0.5  # number, and seconds for the answer to one
 _WIDE = 160  # characters of a line without a terminal
 _HIDE, _SHOW, _CLEAR, _HOME, _END_OF_LINE, _BELOW = "\x1b[?25l", "\x1b[?25h", "\x1b[2J", "\x1b[H", "\x1b[K", "\x1b[J"
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add the verb, with its two verbs, to the subparsers of the command."""
+    """Add the verb, with its own verbs, to the subparsers of the command."""
     mavlink = add_verb(
-        verbs, "mavlink", listen, "show the MAVLink telemetry of any vehicle, or stream a recorded run", "mavlink",
+        verbs, "mavlink", listen, "show any vehicle's telemetry, stream a run, or command a companion", "mavlink",
         ("mavlink listen udpin:127.0.0.1:14550", "mavlink stream runs/docking --mavlink docking.tlog --rate max"),
     )  # fmt: skip
-    inner = mavlink.add_subparsers(required=True, metavar="listen|stream")
+    inner = mavlink.add_subparsers(required=True, metavar="listen|stream|hold|resume")
 
     verb = add_verb(
         inner, "listen", listen, "show any vehicle's MAVLink telemetry as a live table", "mavlink",
@@ -46,6 +48,15 @@ def add_verbs(verbs: Any) -> None:
     verb.add_argument("folder", type=Path, metavar="RUN", help="the run folder")
     add_link_flags(verb, required=True)
     flag(verb, "--rate N|max", "simulated seconds per second", rate, 1.0)
+
+    for name, call, summary in (
+        ("hold", hold, "let a companion release the sticks and hold its vehicle"),
+        ("resume", resume, "let a companion steer again"),
+    ):
+        verb = add_verb(inner, name, call, summary, "howto/companion", (f"mavlink {name} udpout:127.0.0.1:14551",))
+        verb.add_argument("endpoint", metavar="ENDPOINT", help="of the companion, such as udpout:127.0.0.1:14551")
+        flag(verb, "--system-id N", "the companion's system id", int_range(1, 255), 255)
+        add_remote(verb)
 
 
 # ---- listen --------------------------------------------------------------------------------------------------------
@@ -88,6 +99,40 @@ def _print(lines: Sequence[str]) -> None:
 def _redraw(lines: Sequence[str]) -> None:
     sys.stdout.write(_HOME + f"{_END_OF_LINE}\n".join(lines) + _END_OF_LINE + _BELOW)
     sys.stdout.flush()
+
+
+# ---- hold, resume --------------------------------------------------------------------------------------------------
+
+
+def hold(options: argparse.Namespace) -> int:
+    """Run ``cosim mavlink hold``."""
+    return _pause_or_continue(options, 0.0)
+
+
+def resume(options: argparse.Namespace) -> int:
+    """Run ``cosim mavlink resume``."""
+    return _pause_or_continue(options, 1.0)
+
+
+def _pause_or_continue(options: argparse.Namespace, parameter: float) -> int:
+    """Send DO_PAUSE_CONTINUE until the companion answers."""
+    from cosim.companion.autopilot_link import COMPANION
+    from cosim.errors import TelemetryError
+    from cosim.mavlink.wire.dialect import dialect, make_command
+    from cosim.mavlink.wire.ground_end import GroundLink
+
+    m, companion = dialect(), (options.system_id, COMPANION[1])
+    command = make_command(m, companion[0], m.MAV_CMD_DO_PAUSE_CONTINUE, parameter)
+    command.target_component = companion[1]
+    with GroundLink(*network_endpoint(options)) as link:
+        for _ in range(_ATTEMPTS):
+            link.send(command)
+            until = time.monotonic() + _ANSWER_TIMEOUT
+            while (left := until - time.monotonic()) > 0.0:
+                for one in link.receive(left):
+                    if (one.system, one.component, one.name) == (*companion, "COMMAND_ACK"):
+                        return 0 if one.message.result == m.MAV_RESULT_ACCEPTED else 1
+    raise TelemetryError(f"{options.endpoint}: no companion of system {companion[0]} answers")
 
 
 # ---- stream --------------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 import math
 import struct
+import threading
 import time
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
+from cosim.command_line.cli import main
 from cosim.companion.autopilot_link import NetworkLink
 from cosim.companion.clock_sync import ClockSync
 from cosim.companion.companion_options import CompanionOptions
@@ -19,6 +21,7 @@ from cosim.companion.frame_alignment import FrameAlignment, SceneOrigin
 from cosim.companion.heading import HeadingWatch, LevelDive
 from cosim.companion.pilot_watch import PilotWatch
 from cosim.companion.safety import CONDITIONS, Observation, Supervisor
+from cosim.companion.session import AutopilotSession
 from cosim.companion.set_points import TurnLead, VelocityLead, make_attitude_message, make_velocity_target
 from cosim.companion.sticks import make_manual_control, make_stick_scale, override_channels, release_channels
 from cosim.companion.vehicle_state import ReportedState, requested_rates
@@ -31,7 +34,7 @@ from cosim.mavlink.wire.thrust_body import get_thrust_body
 from cosim.simulation.commands.commands import ManualControl
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import Station, scenario
-from tests.cosim.mavlink.stubs import message
+from tests.cosim.mavlink.stubs import free_port, message
 from tests.cosim.sitl.stand_in import VECTORED_6DOF
 
 HEAVY = load_vehicle("bluerov2_heavy")
@@ -593,3 +596,28 @@ def test_simulated_autopilot_clock_runs_at_the_given_speedup():
         link.receive(0.1)  # a fiftieth of a second of the wall's
         assert link.clock() - before >= 0.1
         assert link.clock() == pytest.approx(5.0 * wall, abs=5.0 * (time.monotonic() - wall) + 1e-6)
+
+
+@pytest.mark.medium
+def test_a_verb_lets_a_companion_hold_and_resume(capsys):
+    """Beside it, by its own port; one that is not there is reported in one line."""
+    port, over = free_port(), threading.Event()
+    with NetworkLink(parse_endpoint(f"udpin:127.0.0.1:{port}"), identity=(7, 191)) as link:
+        session = AutopilotSession(link, HEAVY, CompanionOptions())
+
+        def serve():
+            while not over.is_set():
+                session.exchange(np.zeros(6), link.clock(), link.clock() + 0.02)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        try:
+            for verb, is_held in (("hold", True), ("resume", False), ("hold", True)):
+                assert main(["mavlink", verb, f"udpout:127.0.0.1:{port}", "--system-id", "7"]) == 0
+                assert session._taken_over == is_held
+            assert main(["mavlink", "resume", f"udpout:127.0.0.1:{port}"]) == 2
+            assert session._taken_over
+        finally:
+            over.set()
+            thread.join()
+    assert capsys.readouterr().err == f"cosim: udpout:127.0.0.1:{port}: no companion of system 255 answers\n"
