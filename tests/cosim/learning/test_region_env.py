@@ -47,6 +47,7 @@ def episode(env, seed, actions):
     return [first, *(part for action in actions for part in env.step(action)[:2])]
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.filterwarnings("ignore:.*Box observation space m..imum value")
 @pytest.mark.parametrize(
     "parameters",
@@ -83,6 +84,7 @@ def test_flights_side_by_side_are_those_of_single_environments(make, make_vec):
         assert np.array_equal(alone[2::2], [row[i] for row in rewards])
 
 
+@pytest.mark.medium
 def test_the_laws_episode_is_the_run_and_its_return_the_score(make):
     scenario = cosim.load_scenario("docking", EXACT)
     with FusedFlyer(Variation(scenario, [])) as flyer:
