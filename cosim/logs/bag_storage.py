@@ -24,6 +24,9 @@ _RECORD_HEAD = struct.Struct("<BQ")  # opcode and length of an MCAP record
 _MESSAGE_HEAD, _DATA = struct.Struct("<H4xQ"), 22  # channel and time of an MCAP message; bytes before its data
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = range(2, 7)  # opcodes of the MCAP records that are read
 _MAX_RECORD = {_FOOTER: 1 << 10, _SCHEMA: 1 << 20, _CHANNEL: 1 << 20, _MESSAGE: MAX_PART, _CHUNK: MAX_PART}  # bytes
+_DAMAGED = -1  # in place of an opcode
+_CHUNK_HEAD = re.compile(rb"\x04\0\0\0zstd|\x03\0\0\0lz4")  # compression of a chunk
+_BEFORE_COMPRESSION = 37  # bytes of a chunk's record before it
 _NUMBER = re.compile(r"\d+")
 _ZSTANDARD = b"\x28\xb5\x2f\xfd"  # first bytes of compressed data, RFC 8878
 # exceptions that damaged data raises in libraries
@@ -119,9 +122,10 @@ def _mcap_messages(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
     try:
         with path.open("rb") as file:
             read_magic(ReadDataStream(file))
-            for opcode, body in _mcap_records(file):
+            for opcode, body in _mcap_records(file, size):
                 if opcode == _FOOTER:
                     return
+                damaged_chunks += opcode == _DAMAGED
                 position = file.tell() / size
                 try:
                     for kind, record in records_in(body) if opcode == _CHUNK else [(opcode, body)]:
@@ -150,11 +154,17 @@ def _mcap_messages(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
             remarks.append(f"{unknown} messages of {path.name} are of no channel, and were passed over.")
 
 
-def _mcap_records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
-    """Yield opcode and body of each record that matters here, of a file or a chunk."""
+def _mcap_records(file: BinaryIO, size: int = 0) -> Iterator[tuple[int, bytes]]:
+    """Yield opcode and body of each record that matters here, of a file of a size [bytes] or a chunk."""
+    # In a file, `_DAMAGED` stands for bytes that are passed over up to the next compressed chunk.
     while head := file.read(_RECORD_HEAD.size):
-        opcode, length = _RECORD_HEAD.unpack(head)
+        opcode, length = _RECORD_HEAD.unpack(head) if len(head) == _RECORD_HEAD.size else (0, 0)
         limit = _MAX_RECORD.get(opcode)
+        begin = file.tell() - len(head)
+        if size and begin + _RECORD_HEAD.size + length > size and (chunk := _next_chunk(file, begin + 1)) is not None:
+            file.seek(chunk)
+            yield _DAMAGED, b""
+            continue
         if limit is None:
             file.seek(length, os.SEEK_CUR)
             continue
@@ -164,6 +174,18 @@ def _mcap_records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
         if len(body) < length:
             raise EOFError(f"a record has {len(body)} bytes of {length}")
         yield opcode, body
+
+
+def _next_chunk(file: BinaryIO, start: int) -> int | None:
+    """Return the offset of the next compressed chunk from an offset on, or None."""
+    file.seek(start)
+    data = file.read()
+    for match in _CHUNK_HEAD.finditer(data):
+        begin = match.start() - _BEFORE_COMPRESSION
+        if begin >= 0 and data[begin] == _CHUNK:
+            return start + begin
+    file.seek(start - 1 + _RECORD_HEAD.size)
+    return None
 
 
 def _sqlite_messages(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:

@@ -39,6 +39,7 @@ _SAMPLES: dict[str, tuple[tuple[str, ReadComponents], ...]] = {  # message: quan
     "SERVO_OUTPUT_RAW": (("pulses", scale_fields(" ".join(f"servo{i}_raw" for i in range(1, 17)))),),
 }  # fmt: skip
 _IN_MICROSECONDS = ("ODOMETRY", "RAW_IMU")  # messages of _SAMPLES with time_usec; others have time_boot_ms
+_WRAP, _NEAR = 2**32 * 1e-6, 10.0  # s: period of a 32-bit clock of microseconds; distance of stamps of one clock
 _PREFERENCES = {
     "attitude": ("ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE"),
     "rates": ("ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE"),
@@ -54,6 +55,7 @@ class VehicleMessages:
     def __init__(self, contents: LogContents, system: int, autopilot: int, kind: int) -> None:
         self._contents = contents
         self._system, self._autopilot = system, autopilot
+        self._booted = math.nan  # s, last stamp since the vehicle's start
         contents.kind = vehicle_kind(kind)
         contents.autopilot = {_ARDUPILOT: "ardupilot", _PX4: "px4"}.get(autopilot, "")
         contents.preferences |= _PREFERENCES
@@ -64,14 +66,23 @@ class VehicleMessages:
         if reason := self._rejection(name, system, component, message):
             contents.unread[f"{name}{reason}"] += 1
             return
-        # the 32-bit clock of SERVO_OUTPUT_RAW wraps after 71 minutes, so its time of writing is used
         stamp = getattr(message, "time_boot_ms", math.nan) * 1e-3
+        self._booted = self._booted if math.isnan(stamp) else stamp
         if name in _IN_MICROSECONDS:
             stamp = message.time_usec * 1e-6
+        elif name == "SERVO_OUTPUT_RAW":
+            stamp = self._unwrapped(message.time_usec * 1e-6)
         for quantity, components in _SAMPLES.get(name, ()):
             contents.put(quantity, name, stamp, written, components(message.__getattribute__))
         if (read := getattr(self, f"_read_{name.lower()}", None)) is not None:
             read(message, written)
+
+    def _unwrapped(self, stamp: float) -> float:
+        """Return a stamp [s] of a 32-bit clock, which wraps after 71 minutes; NaN if it is not near the last stamp."""
+        if math.isnan(self._booted):
+            return math.nan
+        stamp += _WRAP * round((self._booted - stamp) / _WRAP)
+        return stamp if abs(stamp - self._booted) < _NEAR else math.nan
 
     def _read_manual_control(self, m: Any, written: float) -> None:
         profile = find_profile(self._autopilot)

@@ -23,6 +23,7 @@ from cosim.logs.vehicle_messages import DOWNWARD
 _HEAD = b"\xa3\x95"  # first bytes of each message
 _FMT, _FMT_SIZE = 0x80, 89  # type of the message FMT; its size [bytes]
 _MAX_MESSAGE = 512  # bytes
+_MIN_MARKS = 10  # first bytes of messages in a log of which no message can be read
 _FRAMES = (  # names of ArduSub's FRAME_CONFIG, from 0
     "bluerov1", "vectored", "vectored_6dof", "vectored_6dof_90deg", "simplerov_3", "simplerov_4", "simplerov_5",
 )  # fmt: skip
@@ -57,6 +58,10 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progre
         elif name not in _ABOUT_LOG:
             contents.unread[name] += 1
     if not any_message:
+        with path.open("rb") as file:
+            marks = file.read(1 << 20).count(_HEAD)
+        if marks > _MIN_MARKS:
+            raise ImportLogError("has no message FMT, which defines the others: the beginning of the log is missing")
         raise ImportLogError("holds no message, expected a dataflash log of ArduPilot")
     if lost:
         contents.remarks.append(f"{lost} bytes of the log are no messages and were passed over.")
@@ -159,7 +164,13 @@ def parse_messages(
             is_read = form.name in names
             values = unpack.unpack(data[offset + 3 : file.offset]) if is_read or form.name == "FMT" else ()
             if form.name == "FMT":
-                _learn(values, formats)
+                try:
+                    _learn(values, formats)
+                except ImportLogError:
+                    if len(formats) == 1:
+                        raise
+                    yield None, None  # damage: others are known
+                    continue
             yield form.name, _fields(form, values) if is_read else None
 
 

@@ -19,7 +19,7 @@ from cosim.mavlink.wire.framing import FrameFilter, Header, RxStats, parse_heade
 _STAMP = struct.Struct(">Q")  # us since 1970
 _MAX_FRAME = 300  # bytes, bound of a stamp with its frame
 _MIN_FRAME = _STAMP.size + 8  # bytes
-_EARLIEST, _LATEST = 9e8, 4.1e9  # s since 1970, range of valid stamps
+_EARLIEST, _LATEST = 9e8, 4.1e9  # s since 1970, range of stamps of frames whose checksum is unknown
 _HEARTBEAT = 0  # message id
 
 
@@ -64,9 +64,10 @@ def _frames(path: Path, on_progress: OnProgress) -> Iterator[tuple[float, bytes,
             data, first = file.data, file.offset + _STAMP.size
             header = parse_header(data, first) if data[first] in (0xFE, 0xFD) else None
             stamp = _STAMP.unpack_from(data, file.offset)[0] * 1e-6
-            if header is not None and _STAMP.size + header.size <= ahead and _EARLIEST < stamp < _LATEST:
+            if header is not None and _STAMP.size + header.size <= ahead and stamp < _LATEST:
                 frame = data[first : first + header.size]
-                if header.message_id not in frames.infos or frames.is_intact(frame, header):
+                is_checked = header.message_id in frames.infos  # a station without a set clock writes stamps of 1970
+                if frames.is_intact(frame, header) if is_checked else stamp > _EARLIEST:
                     yield stamp, frame, header
                     file.offset = first + header.size
                     continue

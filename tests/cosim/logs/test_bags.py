@@ -4,12 +4,14 @@ import contextlib
 import shutil
 import sqlite3
 import sys
+import tomllib
 
 import numpy as np
 import pytest
 import tomli_w
 from scipy.spatial.transform import Rotation
 
+from cosim.command_line.cli import main
 from cosim.logs.bag_storage import stored_messages
 from cosim.logs.formats.bag import Decoder
 from cosim.results.log_facts import load_log_facts
@@ -250,6 +252,29 @@ def test_truncated_bag_is_read_to_its_end(bag, columns, tmp_path, imported):
     run = imported(tmp_path / "cut.mcap", columns=columns)
     assert has_remark(run, "breaks off")
     assert 0.0 < run.summary["simulated_time"] < 20.0
+
+
+@pytest.mark.parametrize("part", [0.2, 0.5, 0.8])
+def test_damaged_mcap_is_read_before_and_after_the_damage(bag, columns, dive, tmp_path, imported, part):
+    """Lengths of records are lost there: the reader finds the next chunk."""
+    data = bytearray(bag.read_bytes())
+    where = int(part * len(data))
+    data[where : where + 6000] = np.random.default_rng(0).bytes(6000)
+    (tmp_path / "damaged.mcap").write_bytes(data)
+    run = imported(tmp_path / "damaged.mcap", columns=columns)
+    assert has_remark(run, "damaged chunks of damaged.mcap were passed over")
+    assert run.summary["simulated_time"] > dive.times[-1] - 1.0
+    samples = {t.quantity: t.samples for t in load_log_facts(run.folder).topics}
+    assert samples["position"] > 0.8 * len(dive.times)
+
+
+def test_topics_of_a_bag_without_a_map_are_drafted(bag, tmp_path, capsys):
+    assert main(["import", str(bag), "--vehicle", "bluerov2_heavy", "--out", str(tmp_path / "run")]) == 2
+    draft = capsys.readouterr().out
+    assert "# /odom (20 messages per second)" in draft and "pose.pose.position.x" in draft
+    table = tomllib.loads(draft)
+    assert table["position"] == {key: TABLE["position"][key] for key in ("topic", "columns")}
+    assert table["attitude"]["columns"] == [f"pose.pose.orientation.{a}" for a in "wxyz"]
 
 
 POSITION = TABLE["position"]["columns"][:2]

@@ -161,6 +161,7 @@ REFUSED = [  # name and content of a log, or the log, with the vehicle and the r
     ("it.tlog", b"no log at all, but some text that is long enough", "odin", "no heartbeat of an autopilot"),
     ("it.BIN", b"no log at all", "odin", "no message, expected a dataflash log"),
     ("it.bin", b"\xa3\x95\x80" + bytes(86), "odin", "format"),
+    ("it.BIN", DATAFLASH.read_bytes().replace(b"\xa3\x95\x80", b"\xa3\x95\xfe"), "odin", "no message FMT"),
     ("it.txt", b"x", "odin", "ends in '.txt', expected one of .bag, .bin, .csv"),
     ("it.ulg", b"ULog but not really", "odin", "cannot be read as a ULog file"),
 ]  # fmt: skip
@@ -172,6 +173,52 @@ def test_invalid_log_or_one_of_another_vehicle_is_refused(tmp_path, refused, log
     if content is not None:
         path.write_bytes(content)
     refused(what, path, vehicle)
+
+
+def frames_of(stamps, seconds, copies=1):
+    """Telemetry at 10 Hz of attitude and servo outputs, each frame written at stamps [us] over several links."""
+    with_links = []
+    for k in range(round(10 * seconds)):
+        boot = 4_290_000 + 100 * k  # ms: the clock of microseconds wraps after 5 s
+        pulses = [1500 + int(100 * math.sin(0.1 * k + i)) for i in range(16)]
+        for link in range(copies):
+            stamp = struct.pack(">Q", stamps(k) + 45_000 * link)
+            with_links.append(stamp + SUB.attitude_encode(boot, 0.0, 0.0, 0.01 * k, 0.0, 0.0, 0.1).pack(SUB))
+            servos = SUB.servo_output_raw_encode((1000 * boot) % 2**32, 0, *pulses)
+            with_links.append(stamp + servos.pack(SUB))
+    return heartbeat(12) + b"".join(with_links)
+
+
+def test_messages_over_two_links_count_once_and_at_their_own_time(tmp_path, imported):
+    """Without their stamps, commands would be half a period late or early."""
+    runs = []
+    for copies in (1, 2):
+        (tmp_path / "it.tlog").write_bytes(frames_of(lambda k: START + 100_000 * k, 40.0, copies))
+        runs.append(imported(tmp_path / "it.tlog").record)
+        facts = facts_by_quantity(imported(tmp_path / "it.tlog"))["pulses"]
+        assert (facts.samples, facts.duplicates) == (400, 400 * (copies - 1))
+    for name in ("thrust[1]", "attitude.yaw", "measured.time.commands"):
+        np.testing.assert_allclose(runs[1][name], runs[0][name], atol=1e-6)
+
+
+def test_stamps_of_1970_are_read_with_a_remark(tmp_path, imported):
+    """A station whose clock was set after ten seconds."""
+    (tmp_path / "it.tlog").write_bytes(frames_of(lambda k: (START if k > 100 else 0) + 100_000 * k, 40.0))
+    run = imported(tmp_path / "it.tlog")
+    assert has_remark(run, "jumps by +1.7e+09 s: it is taken as a pause of 1 s")
+    assert facts_by_quantity(run)["attitude"].samples == 400
+
+
+def test_damaged_dataflash_log_gives_what_is_before_and_after(tmp_path, imported, six_thrusters):
+    rng, content = np.random.default_rng(0), bytearray(DATAFLASH.read_bytes())
+    first = facts_by_quantity(imported(DATAFLASH, six_thrusters))["attitude"].samples
+    middle = len(content) // 2
+    content[middle : middle + 3000] = rng.bytes(3000)
+    content[middle + 3000 : middle + 3000] = b"\xa3\x95\x80" + rng.bytes(86)  # a format that is none
+    (tmp_path / "it.bin").write_bytes(content)
+    run = imported(tmp_path / "it.bin", six_thrusters)
+    assert has_remark(run, "bytes of the log are no messages and were passed over")
+    assert 0.9 * first < facts_by_quantity(run)["attitude"].samples < first
 
 
 def test_sticks_replace_missing_servo_outputs(tmp_path, imported):
