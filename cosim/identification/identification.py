@@ -135,10 +135,12 @@ def page_contents(result: Identification, out: Path) -> str:
     from cosim.identification.identification_figures import figures_of, inline_figures
 
     fit, logs = result.fit, result.logs
+    shown = next(iter(result.held_out), None)
     return render_page(
         "cosim.identification/identification.html.j2", vehicle=result.vehicle.title, out=out,
-        figures=inline_figures(figures_of(fit, result.vehicle, result.predictions)), verdict=findings.verdict(fit),
-        warnings=[*summary_lines(result), *findings.warnings(fit, logs)], advice=findings.advice(fit),
+        figures=inline_figures(figures_of(fit, result.vehicle, result.predictions, shown)),
+        verdict=findings.verdict(fit), warnings=[*summary_lines(result), *findings.warnings(fit, logs)],
+        advice=findings.advice(fit),
         rows=list(_rows(result.fit, False)),
         nuisance_rows=list(_rows(result.fit, True)), clusters=fit.intervals.clusters, predictions=result.predictions,
         held_out=[log.name for log in result.held_out], units=UNITS, topics=findings.topic_rows(logs),

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from cosim.identification.excitation import BEGIN, RETURN, SECONDS, Design
 from cosim.identification.fit import Fit
-from cosim.identification.log import AXES, UNITS
-from cosim.identification.prediction import Prediction
+from cosim.identification.log import AXES, UNITS, Log
+from cosim.identification.prediction import Prediction, predicted_samples
 from cosim.report.figures.style import BLACK, BLUE, ORANGE, SKY, STYLE, NamedFigure
 from cosim.report.web_page import InlineFigure, inline_figure
 from cosim.simulation.signals import Array
@@ -21,6 +21,7 @@ from plant_fmu.archive import temporary_folder
 from plant_fmu.vehicle import Vehicle
 
 _WIDTH = 7.2  # in
+_AHEAD = 5.0  # s, horizon of the predictions that are shown over time
 _MAX_LAG = 20  # samples between residuals whose correlation is shown
 _MAX_SHOWN = 60  # parameters in a figure
 
@@ -31,13 +32,17 @@ def inline_figures(drawings: Iterable[NamedFigure]) -> dict[str, InlineFigure]:
         return {drawing.name: inline_figure(drawing, scratch) for drawing in drawings}
 
 
-def figures_of(fit: Fit, vehicle: Vehicle, predictions: Sequence[Prediction]) -> Iterator[NamedFigure]:
+def figures_of(
+    fit: Fit, vehicle: Vehicle, predictions: Sequence[Prediction], shown: Log | None
+) -> Iterator[NamedFigure]:
     """Yield all figures in their order."""
     yield NamedFigure("numbers", _NUMBERS, _numbers(fit))
     yield NamedFigure("residuals", _RESIDUALS, _residuals(fit))
     yield NamedFigure("whiteness", _WHITENESS, _whiteness(fit, vehicle))
     if predictions:
         yield NamedFigure("predictions", _PREDICTIONS, _predictions(predictions))
+    if shown is not None and shown.topic("velocity") is not None:
+        yield NamedFigure("course", _COURSE, velocity_course(shown, fit, vehicle))
     yield NamedFigure("correlation", _CORRELATION, _correlation(fit))
 
 
@@ -55,6 +60,7 @@ _PREDICTIONS = (
     "Free-running prediction: root mean square error of the speed and the angular velocity along and about each axis, "
     "from starts that the samples give."
 )
+_COURSE = f"Velocities of a run, measured, and predicted anew every {_AHEAD:g} s from the measured state."
 _CORRELATION = "Correlation of the numbers: these runs hardly separate two that are dark."
 _REHEARSAL = (
     "The rehearsal: where the vehicle goes, with the numbers as they are known before. Gray: segments; between them "
@@ -138,6 +144,20 @@ def _predictions(predictions: Sequence[Prediction]) -> Figure:
         axes.set_xticks(bars, list(AXES[p.topic]))
         axes.set_ylabel(f"{p.horizon:g} s ahead [{UNITS[p.topic]}]")
     panels[0].legend(loc="upper right", fontsize=7)
+    return figure
+
+
+def velocity_course(log: Log, fit: Fit, vehicle: Vehicle) -> Figure:
+    """Draw measured and predicted velocities of a run."""
+    times, measured, predicted = predicted_samples(log, fit, vehicle, _AHEAD)
+    figure, panels = _panels(3, 1.2, sharex=True)
+    breaks = np.flatnonzero(np.diff((times - times[0]) // _AHEAD)) + 1
+    for axes, component, x, y in zip(panels, AXES["velocity"], measured.T, predicted.T, strict=True):
+        axes.plot(times, x, ".", color=BLUE, markersize=3, label="measured")
+        axes.plot(np.insert(times, breaks, np.nan), np.insert(y, breaks, np.nan), color=ORANGE, label="predicted")
+        axes.set_ylabel(f"{component} [m/s]")
+    panels[0].legend(ncols=2, fontsize=7)
+    panels[2].set_xlabel("time [s]")
     return figure
 
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from cosim.errors import IdentificationError
 from cosim.identification.delays import move_back
-from cosim.identification.fit import fit, single_thread
+from cosim.identification.fit import Fit, fit, single_thread
 from cosim.identification.log import TOPICS, Log
 from cosim.identification.measurements import NO_ERRORS, residual
 from cosim.identification.parameters import (
@@ -59,8 +59,7 @@ def validate(
     """Predict windows of runs from their sampled start states alone, and compare with the samples; step [s]."""
     # `modes`: with attitude and angular velocity predicted (False), and with those that were measured as inputs (True).
     starts = np.array([p.start if not p.is_nuisance else x for p, x in zip(parameters, values, strict=True)])
-    delays = {name: float(x) for p, x in zip(parameters, values, strict=True) if p.kind == "delay" for name in p.topics}
-    logs = [move_back(log, delays) for log in logs]
+    logs = [move_back(log, _delays(parameters, values)) for log in logs]
     predictions = []
     for horizon, measured in itertools.product(horizons, modes):
         windows, _ = cut_windows(logs, vehicle, step, horizon)
@@ -80,6 +79,26 @@ def validate(
         names = [name for name in TOPICS if name in rows]
         predictions += [_summarize(name, horizon, measured, rows[name], len(logs)) for name in names]
     return predictions
+
+
+def predicted_samples(log: Log, fit: Fit, vehicle: Vehicle, horizon: float) -> tuple[Array, Array, Array]:
+    """Return times [s], (n,), measured and predicted velocities, (n, 3), of a run; horizon [s]."""
+    parameters, values = with_mean_nuisances(fit.parameters, fit.values)
+    moved = move_back(log, _delays(parameters, values))
+    windows, _ = cut_windows([moved], vehicle, fit.step, horizon)
+    problem = Residuals([moved], vehicle, parameters, windows, fit.step, turns_measured=fit.turns_measured)
+    settings, parts = problem.settings(values), []
+    for i, window in enumerate(problem.windows):
+        topic = next(t for t in window.topics if t.name == "velocity")
+        error = window.by_topic(problem.raw(i, settings, window.start, full=False)[0])["velocity"] * topic.noise
+        parts.append((topic.times + window.begin, topic.values, topic.values + error))
+    times, measured, predicted = (np.concatenate(x) for x in zip(*parts, strict=True))
+    return times, measured, predicted
+
+
+def _delays(parameters: Sequence[Parameter], values: Array) -> dict[str, float]:
+    """Return the delays [s] by topic."""
+    return {name: float(x) for p, x in zip(parameters, values, strict=True) if p.kind == "delay" for name in p.topics}
 
 
 def _summarize(

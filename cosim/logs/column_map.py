@@ -128,7 +128,7 @@ def source_name(mapped: MappedQuantity) -> str:
 def _attitudes(mapped: MappedQuantity, values: Array, world: str, body: str) -> Array:
     known: NDArray[np.bool_] = np.asarray(np.isfinite(values).all(axis=1))
     if mapped.euler:
-        angles = values[known] * UNITS["rad"][mapped.unit or "rad"]
+        angles = _wrapped(values[known] * UNITS["rad"][mapped.unit or "rad"], mapped.euler)
         _require_angles(mapped, angles)
         odd = np.abs(angles).max(axis=1, initial=0.0) > _MAX_ANGLE
         known[np.flatnonzero(known)[odd]] = False
@@ -149,6 +149,21 @@ def _attitudes(mapped: MappedQuantity, values: Array, world: str, body: str) -> 
     result = np.full((len(values), 4), np.nan)
     if known.any():
         result[known] = convert_quaternions(quaternions, world, body)
+    return result
+
+
+def _wrapped(angles: Array, order: str) -> Array:
+    """Return angles [rad] with a continuous yaw, which filters count on beyond a turn, within half a turn."""
+    yaw = [i for i, axis in enumerate(order.lower()) if axis == "z"][:1]
+    counted = angles[:, yaw]
+    if (
+        not len(angles)
+        or np.abs(counted[0]).max() > _MAX_ANGLE
+        or np.abs(np.diff(counted, axis=0)).max(initial=0.0) > 1.0
+    ):
+        return angles
+    result = angles.copy()
+    result[:, yaw] = np.remainder(counted + np.pi, 2.0 * np.pi) - np.pi
     return result
 
 

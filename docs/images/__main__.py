@@ -15,6 +15,7 @@ import criteria
 import fmu
 import pages
 import paths
+import pool
 import tutorial
 
 HERE = Path(__file__).parent
@@ -36,6 +37,7 @@ MAKERS = {
     "fmu": fmu.main,
     "pages": pages.main,
     "paths": paths.main,
+    "pool": pool.main,
     "reference": reference,
     "tutorial": tutorial.main,
 }

@@ -45,6 +45,7 @@ class _Layout(NamedTuple):
     separator: str
     encoding: str
     decimal: str
+    skipped: int = 1  # lines up to the header
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progress: OnProgress) -> None:
@@ -103,7 +104,11 @@ def _layout(path: Path) -> _Layout:
     encoding = next((name for mark, name in _MARKS.items() if head.startswith(mark)), "utf-8")
     if encoding == "utf-8" and b"\0" in head[:200]:
         encoding = "utf-16-le" if head[1:2] == b"\0" else "utf-16-be"
-    first, *others = head.decode(encoding, "replace").splitlines()[:20] or [""]
+    lines = head.decode(encoding, "replace").splitlines()
+    comments = next((k for k, line in enumerate(lines) if not line.startswith(("#", "%"))), 0)
+    # the header is the first line without a mark, or the last one with a mark if numbers follow it
+    above = comments - 1 if comments and lines[comments].lstrip()[:1] in "0123456789.-+" else comments
+    first, *others = lines[above : above + 20] or [""]
     separator = max(",;\t|", key=first.count)
     try:
         names = [name.strip() for name in next(csv.reader([first.lstrip("#% ")], delimiter=separator), [])]
@@ -111,7 +116,7 @@ def _layout(path: Path) -> _Layout:
         raise ImportLogError(f"cannot be read: {error}") from error
     cells = [cell for line in others for cell in line.split(separator)]
     has_commas = separator != "," and any(map(_DECIMAL_COMMA.fullmatch, cells))
-    return _Layout(names, separator, encoding, "," if has_commas else ".")
+    return _Layout(names, separator, encoding, "," if has_commas else ".", above + 1)
 
 
 def _batches(
@@ -138,7 +143,11 @@ def _batches(
         )  # fmt: skip
         total, done = max(1, path.stat().st_size), 0
         read = pa.csv.ReadOptions(
-            block_size=_BLOCK, column_names=layout.names, skip_rows=1, encoding=layout.encoding, use_threads=False
+            block_size=_BLOCK,
+            column_names=layout.names,
+            skip_rows=layout.skipped,
+            encoding=layout.encoding,
+            use_threads=False,
         )
         parse = pa.csv.ParseOptions(delimiter=layout.separator, invalid_row_handler=skip)
         with contextlib.closing(pa.csv.open_csv(path, read, parse, convert)) as reader:

@@ -121,6 +121,8 @@ def test_flaws_of_samples_are_mended_and_counted(read, flaw, remark):
         (PLAIN.to_csv(index=False).encode("utf-16-le"), ""),
         (PLAIN.to_csv(index=False).encode("utf-8-sig").replace(b"\n", b"\r\n"), ""),
         ("# " + PLAIN.to_csv(index=False), ""),
+        ("# pool of 2024\n# by the logger\n" + PLAIN.to_csv(index=False), ""),
+        ("% a comment\n% " + PLAIN.to_csv(index=False).replace(",", ", "), ""),
         (
             PLAIN.to_csv(index=False).replace("\n", "\ns,rad,rad,rad,m/s,m/s,m/s,m,N,N,N,N m,N m,N m\n", 1),
             "1 lines with",
@@ -138,6 +140,8 @@ def test_flaws_of_samples_are_mended_and_counted(read, flaw, remark):
         "utf-16-without-mark",
         "utf-8-mark",
         "hash",
+        "comments",
+        "spaces",
         "unit-row",
         "header-twice",
         "cut",
@@ -157,6 +161,14 @@ def test_held_values_are_samples_of_their_own_at_any_rate(read):
     run = read(motion(t).assign(u=held["u"], v=held["v"], w=held["w"]))
     dvl = next(topic for topic in load_log_facts(run.folder).topics if topic.quantity == "dvl")
     assert dvl.samples == pytest.approx(540, abs=2) and dvl.rate == pytest.approx(9.0, abs=0.8)
+
+
+def test_a_yaw_that_is_counted_on_is_an_attitude(read):
+    """Filters that do not wrap: three turns."""
+    run = read(PLAIN.assign(yaw=0.4 * PLAIN["t"]))
+    known = np.isfinite(run.record["attitude.yaw"])
+    off = run.record["attitude.yaw"] - 0.4 * run.record["time"]
+    assert np.abs(np.angle(np.exp(1j * off[known]))).max() < 1e-3
 
 
 def test_a_third_of_repeats_is_held_and_less_is_not():
