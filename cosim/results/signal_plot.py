@@ -37,9 +37,8 @@ def plot_signals(record: Record, patterns: Sequence[str], title: str, ax: Any) -
     elif len(by_unit) == 1:
         column = [ax]
     else:
-        raise RunError(
-            f"ax is given for signals in {' and '.join(map(_format_unit, by_unit))}, expected one unit, or no ax"
-        )
+        units_of_signals = " and ".join(unit or "no unit" for unit in by_unit)
+        raise RunError(f"ax is given for signals in {units_of_signals}, expected one unit, or no ax")
     for axes, (unit, names_of_unit) in zip(column, by_unit.items(), strict=True):
         for name in names_of_unit:
             axes.plot(record["time"], record[name], label=name)
@@ -49,10 +48,6 @@ def plot_signals(record: Record, patterns: Sequence[str], title: str, ax: Any) -
     first = column[0]
     first.set_title(_wrap_title(title, first), fontsize="medium")
     return first
-
-
-def _format_unit(unit: str) -> str:
-    return unit or "no unit"
 
 
 def _wrap_title(title: str, axes: Any) -> str:

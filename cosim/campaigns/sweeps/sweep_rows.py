@@ -101,11 +101,13 @@ class SweepWork(Work):
         self.task = SweepTask(self.variation, FusedFlyer)
         self.schema = schema_of(keys)
         self.files = files_of(scenario)
+        table = table_of_files(scenario)
         self.plan = {
             "kind": SWEEP,
             "name": scenario.name,
             **design.table(),
-            "scenario": _for_json(table_of_files(scenario)),
+            # NaN and infinity as text
+            "scenario": json.loads(json.dumps(table), parse_constant=lambda text: repr(float(text))),
             "vehicle_sha256": sha256(self.files.get(VEHICLE_COPY, b"")).hexdigest(),
             "code_sha256": code_digest(),
             "versions": versions(),
@@ -121,8 +123,3 @@ class SweepWork(Work):
     def refused_table(self, row: int, reason: str) -> Any:
         """Return the table of one row that could not be flown."""
         return table_of(self.variation.keys, self.batch(np.array([row])), BatchResult(empty_outcomes(1), {0: reason}))
-
-
-def _for_json(value: Any) -> Any:
-    """Convert a table of a scenario for JSON, with texts for NaN and infinity."""
-    return json.loads(json.dumps(value), parse_constant=lambda text: repr(float(text)))
