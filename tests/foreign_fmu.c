@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OK, ERROR, FATAL, DISCARD, END, HANG, NOT_A_NUMBER, NULL_MESSAGE, SHORT, WARNED };
+enum { OK, ERROR, FATAL, DISCARD, END, HANG, NOT_A_NUMBER, NULL_MESSAGE, SHORT, WARNED, PERCENT };
 
 /* places in v, which are the value references */
 enum { MODE, AT, GAIN, INPUTS = 10, OUTPUTS = 20, NO_ROLLBACK = 29, MATRIX = 30, SIZE = 34 };
@@ -73,6 +73,9 @@ static STATUS step(Fmu *f, double now, double h, bool no_rollback)
         return S(Fatal);
     case NULL_MESSAGE:
         LOG(f, S(Error), NULL);
+        return S(Error);
+    case PERCENT: /* no format, but written as if it were one */
+        LOG(f, S(Error), "fails at 50% speed");
         return S(Error);
     case WARNED:
         LOG(f, S(Warning), "x is too large");

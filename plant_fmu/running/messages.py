@@ -26,6 +26,7 @@ _FIRST_PAGE = 4096  # bytes, where no text is
 
 # Variable arguments after five of the logger, by calling convention: words that are no arguments, and the numbers of
 # further words and of floating-point numbers in registers. The others follow on the stack, in order.
+_IS_KNOWN = platform.machine().lower() in ("x86_64", "amd64", "aarch64", "arm64")
 _APPLE_SILICON = sys.platform == "darwin" and platform.machine() == "arm64"
 if sys.platform == "win32":
     _SKIPPED, _WORDS, _FLOATS = 0, 0, 0
@@ -71,7 +72,7 @@ def fmi2_callbacks(messages: Messages) -> fmi2CallbackFunctions:
 
     # not through FMPy's logger proxy, which serves one instance in the whole process
     def receive(env: Any, name: bytes, status: int, category: bytes, message: bytes | None, *arguments: Any) -> None:
-        messages.receive(status, message, arguments)
+        messages.receive(status, message, arguments if _IS_KNOWN else ())
 
     callbacks = fmi2CallbackFunctions()
     callbacks.kept = _LOGGER(receive)
@@ -130,6 +131,18 @@ def _parts(text: str, next_word: Callable[[], int], next_float: Callable[[], flo
     yield text[end:]
 
 
+def _is_readable(address: int) -> bool:
+    """Return False for an address that Linux knows to be none."""
+    try:
+        with open("/proc/self/mem", "rb", buffering=0) as memory:
+            memory.seek(address)
+            return len(memory.read(1)) == 1
+    except FileNotFoundError:
+        return True
+    except (OSError, ValueError, OverflowError):
+        return False
+
+
 def _signed(word: int, bits: int) -> int:
     word %= 2**bits
     return word - 2**bits if word >= 2 ** (bits - 1) else word
@@ -139,6 +152,8 @@ def _string_at(address: int, length: int | None) -> str:
     """Return the text at an address, up to its end or to a length."""
     if address < _FIRST_PAGE:
         return "(null)"
+    if not _is_readable(address):  # the message was no format
+        return "(unknown)"
     data = bytearray()
     if length is None:
         return ctypes.string_at(address).decode("utf-8", "replace")

@@ -1,6 +1,7 @@
 """An FMU of the user's as the law: the same bits as the law that it was made of, its map, and each of its failures."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -8,9 +9,11 @@ import sys
 import numpy as np
 import pytest
 
-from cosim import Master, check_scenario, load_run, load_scenario, run_scenario
+from cosim import Master, check_scenario, generate_scenes, load_run, load_scenario, run_scenario
 from cosim.batch.fused import FusedFlyer
 from cosim.batch.variation import Variation
+from cosim.campaigns.scenes.scene_rows import SCHEMA
+from cosim.campaigns.store.results import Results
 from cosim.command_line.cli import main
 from cosim.errors import ScenarioError
 from cosim.scenario.scenario import files_of
@@ -19,6 +22,7 @@ from cosim.simulation.commands.sources import CommandQueue
 from cosim.ssp.controller import controller_component
 from plant_fmu import PlantError
 from plant_fmu.build import cached_fmu
+from tests.architecture.modules import ROOT
 from tests.cosim.simulation.keep import kept_rows
 from tests.foreign_fmu import MODES, build_foreign_fmu
 
@@ -215,3 +219,41 @@ def test_commands_steer_beside_the_fmu(fmus):
             master.step(k, queue)
             if k in (19, 30, 59):
                 assert (np.abs(master.row[master.signals.index("wrench.Z")]) > 0.0) == (k != 30)
+
+
+@pytest.mark.medium
+def test_controller_of_the_howto_flies(tmp_path, monkeypatch):
+    """A controller made by pythonfmu, in the scenario of docs/howto/your-fmu.md."""
+    builder = pytest.importorskip("pythonfmu.builder")
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs" / "howto" / "your-fmu.md").read_text(encoding="utf-8")
+    code, table = (re.search(rf"```{kind}\n(.*?)```", page, re.S)[1] for kind in ("python", "toml"))
+    (tmp_path / "brake.py").write_text(code)
+    builder.FmuBuilder.build_FMU(tmp_path / "brake.py", tmp_path)
+    (tmp_path / "mine.toml").write_text(table)
+    run = run_scenario(load_scenario("mine.toml", ["time.duration=2"]), tmp_path / "run", report=False)
+    np.testing.assert_allclose(run.record["wrench.Z"][:-1:10], -80.0 * run.record["velocity.w"][:-1:10], rtol=1e-15)
+    assert np.abs(run.record["wrench.Z"]).max() > 0.0
+
+
+@pytest.mark.medium
+def test_campaigns_comparisons_and_repeats_fly_an_fmu(fmus, tmp_path, monkeypatch):
+    """By its file, or by that of a scenario; another FMU in its place is no repeat."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(fmus / "brake3.fmu", "mine.fmu")
+    (tmp_path / "mine.toml").write_text('base = "paper"\nlaw = { file = "mine.fmu", parameters = { gain = -50.0 } }\n')
+    (tmp_path / "scenes.jsonl").write_text("\n".join(generate_scenes(2)))
+    rows = []
+    for law, changes in (("mine.fmu", ["--set", "gain=-50"]), ("mine.toml", [])):
+        assert main(["campaign", "scenes.jsonl", "--law", law, *changes, "--out", law[5:], "--quiet"]) == 0
+        results = Results(tmp_path / law[5:] / "results.parquet", SCHEMA)
+        rows.append(results.number("min_clearance"))
+        assert results.is_null("refused").all()
+    assert len(rows[0]) == 2
+    np.testing.assert_array_equal(*rows)
+    assert main(["compare", "scenes.jsonl", "--laws", "pd,mine.toml", "--out", "both", "--quiet"]) == 0
+    assert {"pd", "mine.toml"} <= {path.name for path in (tmp_path / "both").iterdir()}
+    assert main(["rerun", "fmu", "1", "--out", "again", "--quiet"]) == 0
+    with (tmp_path / "mine.fmu").open("ab") as file:
+        file.write(b" ")
+    assert main(["rerun", "fmu", "1", "--out", "again2", "--quiet"]) == 2
