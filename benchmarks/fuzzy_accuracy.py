@@ -234,12 +234,12 @@ def errors(case: Case) -> tuple[float, str]:
 
 def print_worst(systems: int, seed: int) -> None:
     """Print the worst error of each defuzzifier over random systems, and how many are beyond the bound."""
-    errors: dict[str, list[float]] = {name: [] for name in DEFUZZIFIERS}
+    by_defuzzifier: dict[str, list[float]] = {name: [] for name in DEFUZZIFIERS}
     for case in random_cases(systems, seed):
         error, _ = errors(case)
-        errors[case.output.defuzzifier].append(error)
+        by_defuzzifier[case.output.defuzzifier].append(error)
     print(f"{'defuzzifier':12} {'systems':>8} {'without area':>13} {'worst error':>12} {f'beyond {BOUND:g}':>13}")
-    for name, values in errors.items():
+    for name, values in by_defuzzifier.items():
         known: Any = np.array(values)
         empty = int(np.isnan(known).sum())
         worst = float(np.nanmax(known)) if empty < len(known) else 0.0

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fuzzy_arbiter.arbiter import Arbiter, is_table
-from fuzzy_arbiter.checks import shown
+from fuzzy_arbiter.checks import all_of, shown
 from fuzzy_arbiter.definition import Output, System, Variable, variable_names
 from fuzzy_arbiter.errors import ArbiterError, DefinitionError, EngineError, InputError
 from fuzzy_arbiter.samples import Columns
@@ -185,7 +185,7 @@ def _chosen(names: Sequence[str], free: str | Sequence[str], fixed: str | Sequen
     """Return the names that a pattern of `free` matches and none of `fixed`."""
     matches: list[set[str]] = []
     for what, patterns in (("free", free), ("fixed", fixed)):
-        listed = (patterns,) if isinstance(patterns, str) else tuple(patterns)
+        listed = (patterns,) if isinstance(patterns, str) else all_of(str, patterns, what, "patterns of names")
         for pattern in listed:
             if not any(fnmatchcase(name, pattern) for name in names):
                 raise DefinitionError(f"{what}: no parameter {pattern!r}, expected some of {', '.join(names)}")

@@ -126,6 +126,7 @@ def test_order_and_ranges_are_kept_whatever_the_data(seed):
         ((X, ["a"] * 60), "y: could not convert"),
         ((X * 2, X[:, 0]), "row 0: service is"),
         ((X, X[:, 0], {"free": "tips.*"}), "free: no parameter 'tips.*', expected some of service.poor.x1, "),
+        ((X, X[:, 0], {"free": 3}), "free: got 3, expected patterns of names"),
         ((X, X[:, 0], {"fixed": ["*"]}), "free: got no parameter that is not fixed"),
         ((X, X[:, 0], {"sample_weight": -np.ones(60)}), "sample_weight: got -1.0, expected numbers that are not neg"),
     ],

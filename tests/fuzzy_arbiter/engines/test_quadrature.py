@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from benchmarks.fuzzy_accuracy import BOUND as ACCURACY
-from benchmarks.fuzzy_accuracy import errors, random_cases, strengths_system
+from benchmarks.fuzzy_accuracy import DEFUZZIFIERS, errors, print_worst, random_cases, strengths_system
 from fuzzy_arbiter import Arbiter, Output, Rule, Term, falling, rising, trapezoid, triangle
 from fuzzy_arbiter.engines.clipped_curves import ClippedCurves
 from fuzzy_arbiter.engines.exact import ExactEngine
@@ -313,3 +313,10 @@ def test_arbiter_names_the_evaluation_method_of_each_output():
     straight = strengths_system(Output("y", (0, 10), TERMS[3:]), "min")
     assert Arbiter(straight).engine_reason.startswith("there is no closed form: ")
     assert "quadrature" not in Arbiter(straight).engine_reason
+
+
+def test_the_worst_error_of_each_defuzzifier_is_printed(capsys):
+    print_worst(5, seed=0)
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[1:]] == list(DEFUZZIFIERS)
+    assert all(line.split()[1] == "1" and line.split()[-1] == "0" for line in lines[1:])
