@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from controller.driven_axes import left_axes
 from controller.errors import LawError
 from controller.stack_array import Array, Vector6
 
@@ -59,10 +60,16 @@ class Allocation:
     """Thruster allocation by the pseudo-inverse, the least forces that give a wrench; lower, upper [N]."""
 
     # Thrusters whose limits are both 0 are left out. Forces of the pseudo-inverse are cut to the limits, and not
-    # reallocated, so that one-sided thrusters (a limit of 0) stop every wrench that needs their other side.
+    # reallocated, so that one-sided thrusters (a limit of 0) stop every wrench that needs their other side. With
+    # `rights` the vehicle rights itself: moments that thrusters cannot give alone are left out.
 
     def __init__(
-        self, matrix: Array, lower: Array, upper: Array, limits: Literal["direction", "per-thruster"] = "direction"
+        self,
+        matrix: Array,
+        lower: Array,
+        upper: Array,
+        limits: Literal["direction", "per-thruster"] = "direction",
+        rights: bool = False,
     ) -> None:
         n = matrix.shape[1]
         if matrix.shape != (6, n) or lower.shape != (n,) or upper.shape != (n,):
@@ -74,7 +81,10 @@ class Allocation:
         if limits not in ("direction", "per-thruster"):
             raise LawError(f"limits is {limits!r}, expected 'direction' or 'per-thruster'")
         alive = (lower != 0.0) | (upper != 0.0)
-        inverse = np.ascontiguousarray(np.linalg.pinv(np.where(alive, matrix, 0.0)))
+        working = np.where(alive, matrix, 0.0)
+        if rights:
+            working[left_axes(matrix, lower[None], upper[None])[0] or []] = 0.0
+        inverse = np.ascontiguousarray(np.linalg.pinv(working))
         self.arguments = inverse, np.array(lower, dtype=float), np.array(upper, dtype=float), limits == "direction"
 
     def __call__(self, tau: Array, forces: Array) -> bool:

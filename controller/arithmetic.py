@@ -49,6 +49,11 @@ def cosine(x: float) -> float:
     return -r * sin_r if quarter == 1 else r * sin_r
 
 
+def sine(x: float) -> float:
+    """Return sin x of an angle below 1e6 [rad], within 4e-16."""
+    return cosine(_QUARTER - x)
+
+
 def exponential(x: float) -> float:
     """Return e^x of a number between -700 and 700, within 4e-16 of itself: Taylor's series, doubled or halved."""
     doublings = nearest_integer(x / _LN_2)

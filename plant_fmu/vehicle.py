@@ -170,6 +170,11 @@ class Vehicle:
         return int(self.thruster_matrix.shape[1])
 
     @property
+    def righting_moment(self) -> float:
+        """z_G W - z_B B [N m], about roll and pitch of a level vehicle per radian of tilt."""
+        return float(self.weight * self.r_G[2] - self.buoyancy * self.r_B[2])
+
+    @property
     def mass_matrix(self) -> NDArray[np.float64]:
         """M of (11), shape (6, 6) [kg, kg m, kg m2]: rigid body plus added mass, about the body origin."""
         S = np.cross(np.eye(3), self.r_G)  # S(r_G), (4)

@@ -16,7 +16,7 @@ def add_verbs(verbs: Any) -> None:
     """Add the verb to the subparsers of the command."""
     verb = add_verb(
         verbs, "scenes", scenes, "generate random scenes for campaigns, one JSON object a line", "campaigns",
-        ("scenes --count 200 --seed 0 --out scenes.jsonl", "scenes --kind hard --count 3"),
+        ("scenes --count 200 --seed 0 --out scenes.jsonl", "scenes --kind hard --vehicle bluerov2 --count 3"),
     )  # fmt: skip
     flag(verb, "--count N", "scenes", int_range(1, _MAX_COUNT), 100)
     flag(
@@ -32,6 +32,7 @@ def add_verbs(verbs: Any) -> None:
         "each test one part of a law; mismatch: the plant is not the vehicle of the file", default="plain",
         choices=("plain", "hard", "conflict", "tour", "trial", "mismatch"),
     )  # fmt: skip
+    flag(verb, "--vehicle VEHICLE", "vehicle of plain and hard scenes, a shipped name or a TOML file (default: odin)")
     flag(verb, "--out FILE", "file to write (default: standard output)", Path)
 
 
@@ -40,7 +41,7 @@ def scenes(options: argparse.Namespace) -> int:
     from cosim.campaigns.scenes.generator import generate_scenes
     from plant_fmu.archive import atomic_file
 
-    lines = generate_scenes(options.count, options.seed, options.kind)
+    lines = generate_scenes(options.count, options.seed, options.kind, options.vehicle)
     if options.out is None:
         for line in lines:
             print(line)

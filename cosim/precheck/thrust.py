@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import brentq
 
 from controller import paper_law
+from controller.driven_axes import PITCH, ROLL, join_axes, undriven_axes
 from controller.force_limits import max_forces
+from controller.laws.deployable.braking import greatest_speed
 from controller.paper_law import primary_error, secondary_error
 from controller.quaternion import error, rotation_matrix
 from controller.regions.region_set import evaluate_at_pose
@@ -17,7 +20,9 @@ from cosim.precheck.thrust_margin import Margin, ThrustMargin, held_wrench, leas
 from cosim.results.wording import format_force
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_vehicle
+from cosim.scenario.vehicle_model import vehicle_model
 from cosim.simulation.signals import Array
+from plant_fmu.vehicle import Vehicle
 
 _ROUNDING = 1e-6  # N, a force up to which nothing counts as left
 
@@ -28,6 +33,7 @@ def thrust_findings(scenario: Scenario) -> Iterator[Finding]:
     quaternion, current = np.array(scenario.law.desired_quaternion), np.array(scenario.plant.current)
     margin = thrust_margin(vehicle, phi, quaternion, current)
     against = f"the current's drag of {margin.drag:.3g} N and W - B = {margin.excess_weight:.3g} N"
+    yield from _undriven_finding(scenario, vehicle)
     numbers: dict[str, float | str | None] = {
         "drag": margin.drag, "excess_weight": margin.excess_weight,
         "thrust": _force(margin.thrust), "left": _force(margin.left),
@@ -44,6 +50,29 @@ def thrust_findings(scenario: Scenario) -> Iterator[Finding]:
         yield Finding("thrust", "holding still", "fails", text, _mend_current(scenario), numbers)
         return
     yield _with_one_lost(margin)
+
+
+def _undriven_finding(scenario: Scenario, vehicle: Vehicle) -> Iterator[Finding]:
+    """Yield a finding if the thrusters do not drive all axes, or none of the vehicle's moments rights it."""
+    left = undriven_axes(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+    if scenario.actuation.through != "thrusters" or not left:
+        return
+    righting, names = vehicle.righting_moment, join_axes(left)
+    full = np.abs(vehicle.thruster_matrix[left]) @ np.maximum(-vehicle.thrust_min, vehicle.thrust_max)
+    lean = float(full.max()) / righting if righting > 0.0 else math.inf
+    text = f"The thrusters do not drive {names}: a righting moment of {righting:.3g} N m is left to hold it"
+    tilt = f"by at most {math.degrees(math.asin(lean)):.0f}°" if lean < 1.0 else "over"
+    speed = ""
+    if scenario.law.name == "deployable":
+        tilt_limit = scenario.law.gains.tilt
+        limit = greatest_speed(vehicle_model(scenario.vehicle), tilt_limit)
+        speed = f" The law keeps below {math.degrees(tilt_limit):.0f}°, at up to {limit:.2g} m/s through the water."
+    holds = righting > 0.0 and {ROLL, PITCH} >= set(left)
+    advice = "Put the center of buoyancy (plant.parameters.r_B.z) above the center of gravity, or add thrusters."
+    yield Finding(
+        "thrust", "undriven axes", status(holds), f"{text}, which all thrusters at full force tilt {tilt}.{speed}",
+        "" if holds else advice, {"righting_moment": righting},
+    )  # fmt: skip
 
 
 def _with_one_lost(margin: ThrustMargin) -> Finding:

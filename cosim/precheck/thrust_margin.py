@@ -6,10 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from controller.driven_axes import add_righting
 from controller.force_limits import DIRECTIONS, max_forces
+from controller.laws.deployable.gains import DeployableGains
 from controller.quaternion import rotation_matrix
 from controller.restoring import regressor
 from controller.theory import coriolis, damping
+from cosim.scenario.vehicle_model import vehicle_model
 from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
 
@@ -69,7 +72,10 @@ def thrust_margin(vehicle: Vehicle, phi: Array, quaternion: Array, current: Arra
 def least_margins(vehicle: Vehicle, quaternion: Array, hold: Array, alive: Array) -> list[Margin | None]:
     """Return the direction and force of the minimum margin for each row of `alive`, None if `hold` is not feasible."""
     directions = DIRECTIONS @ rotation_matrix(quaternion)  # in the body frame
-    limits = vehicle.thrust_min * alive, vehicle.thrust_max * alive
-    forces = max_forces(vehicle.thruster_matrix, *limits, directions, hold)
+    B, lower, upper = vehicle.thruster_matrix, vehicle.thrust_min * alive, vehicle.thrust_max * alive
+    righting = vehicle_model(vehicle).righting_moment
+    if righting > 0.0:
+        B, lower, upper = add_righting(B, lower, upper, righting * np.sin(DeployableGains().tilt))
+    forces = max_forces(B, lower, upper, directions, hold)
     worst = np.argmin(forces.round(9), axis=1)  # the first of equal ones
     return [None if np.isnan(row[i]) else Margin(NAMES[i], float(row[i])) for row, i in zip(forces, worst, strict=True)]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from controller.driven_axes import AXES, undriven_axes
 from controller.regions.region_set import of_attitude
 from cosim.io.strict_json import nan_to_none
 from cosim.results.goal_miss import explain_miss
@@ -80,7 +81,7 @@ def summarize(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "weights_sum_max": data.greatest["sum of weights"],
         "effort": data.force.total() * period,
         "saturated_time": data.saturated * period,
-        "isolations": [{"thruster": j, "time": time} for time, j, isolated in data.isolations.changes if isolated],
+        "isolations": _isolations(scenario, data.isolations.changes),
         "rejected_samples": last.get(REJECTED),
         "drag_ratio": nan_to_none(last.get(DRAG)),
         "above_surface": above,
@@ -95,6 +96,17 @@ def summarize(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "real_time_factor": simulated / wall_time if wall_time else None,
     }
     return summary | {"goal_miss": explain_miss(scenario, record, data.flags, summary)}
+
+
+def _isolations(scenario: Scenario, changes: list[tuple[float, int, bool]]) -> list[dict[str, Any]]:
+    """Return the isolations of thrusters, each with the axes that those left do not drive."""
+    vehicle, works, isolations = scenario.vehicle, np.ones(scenario.vehicle.n_thrusters), []
+    for time, thruster, isolated in changes:
+        works[thruster - 1] = not isolated
+        if isolated:
+            axes = undriven_axes(vehicle.thruster_matrix, vehicle.thrust_min * works, vehicle.thrust_max * works)
+            isolations.append({"thruster": thruster, "time": time, "undriven": [AXES[axis] for axis in axes]})
+    return isolations
 
 
 class _SummaryData:

@@ -99,8 +99,12 @@ def isolation_text(thruster: int, isolated: bool) -> str:
 
 
 def format_isolations(summary: dict[str, Any]) -> str:
-    """List the thrusters that the law isolated and when, such as ``3 at 12.30 s``; empty for none."""
-    isolations = [f"{one['thruster']} at {one['time']:.2f} s" for one in summary["isolations"]]
+    """List the thrusters that the law isolated and when, such as ``3 at 12.30 s (pitch undriven)``; empty for none."""
+    isolations = [
+        f"{one['thruster']} at {one['time']:.2f} s"
+        + (f" ({' and '.join(one['undriven'])} undriven)" if one.get("undriven") else "")
+        for one in summary["isolations"]
+    ]
     more = f" and {len(isolations) - _MAX_LISTED} more" if len(isolations) > _MAX_LISTED else ""
     return ", ".join(isolations[:_MAX_LISTED]) + more
 

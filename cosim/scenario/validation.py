@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 
 from controller import LAWS
+from controller.driven_axes import AXES, PITCH, require_driven
+from controller.quaternion import down_in_body
 from controller.regions import Region, Sphere
 from controller.regions.region_set import of_attitude
 from controller.regions.shape import Shape
@@ -26,6 +28,7 @@ from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle
 
 ROUNDING = 1e-6  # tolerance of a multiple of the step, as a fraction of the step
+_LEVEL = 1e-6  # cosine of the vertical up to which an attitude is level
 MAX_STEPS = 100_000_000  # maximum number of plant steps of a run
 
 # parameters of the FMU for which a scenario has other keys
@@ -164,7 +167,14 @@ def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_
     law = LAWS[entry.name]
     if law.output == "thrusters" and through != "thrusters":
         raise ScenarioError(f"actuation.through is {through!r}, expected 'thrusters': law {entry.name!r} drives them")
-    law.for_vehicle(vehicle_model(vehicle), setup.gains, np.array(entry.desired_quaternion), period, n_regions)
+    model = vehicle_model(vehicle)
+    if through == "thrusters":
+        left = require_driven(model.thruster_matrix, model.thrust_min, model.thrust_max, model.righting_moment)
+        down = down_in_body(np.array(entry.desired_quaternion))
+        for axis in left:
+            level = abs(down[PITCH - axis]) <= _LEVEL
+            _require(level, "law.desired_quaternion", f"tilted in {AXES[axis]}", "no tilt there: no thruster drives it")
+    law.for_vehicle(model, setup.gains, np.array(entry.desired_quaternion), period, n_regions)
     return setup
 
 

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from controller.driven_axes import left_axes
 from controller.law import VehicleModel
 from plant_fmu.vehicle import Vehicle
 
 
 def vehicle_model(vehicle: Vehicle) -> VehicleModel:
     """Return a vehicle's nominal model for a law, without weight, buoyancy and their centers."""
+    # It has their righting moment where thrusters do not drive all axes, or would not with one of them lost.
     rigid_mass = np.zeros((6, 6))
     rigid_mass[:3, :3] = vehicle.mass * np.eye(3)
     rigid_mass[3:, 3:] = vehicle.inertia
-    return VehicleModel(
+    model = VehicleModel(
         rigid_mass=rigid_mass,
         added_mass=np.array(vehicle.added_mass, dtype=float),
         linear_damping=np.array(vehicle.linear_damping, dtype=float),
@@ -23,3 +25,8 @@ def vehicle_model(vehicle: Vehicle) -> VehicleModel:
         thrust_max=np.array(vehicle.thrust_max, dtype=float),
         thrust_time_constant=np.array(vehicle.thrust_time_constant, dtype=float),
     )
+    works = ~np.eye(vehicle.n_thrusters + 1, vehicle.n_thrusters, dtype=bool)
+    left = left_axes(model.thruster_matrix, model.thrust_min * works, model.thrust_max * works)
+    if all(axes == [] for axes in left):
+        return model
+    return model._replace(righting_moment=vehicle.righting_moment)

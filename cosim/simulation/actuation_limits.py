@@ -6,6 +6,7 @@ import numpy as np
 
 from controller.allocation import Allocation
 from cosim.scenario.scenario import Scenario
+from cosim.scenario.vehicle_model import vehicle_model
 from cosim.simulation.stepped_plant import SteppedPlant
 from cosim.step.step_model import Allocator, Array, StepData, StepModel
 
@@ -35,12 +36,13 @@ def failure_stages(scenario: Scenario, model: StepModel, limits: Array | None = 
         return Allocator(np.zeros((1, 0, 6)), np.zeros((1, 0)), np.zeros((1, 0)), False)
     vehicle, mode = scenario.vehicle, scenario.actuation.limits
     own = vehicle.thrust_min, vehicle.thrust_max
+    rights = vehicle_model(vehicle).righting_moment > 0.0
     health, stages = np.ones(vehicle.n_thrusters), []
     total = model.failed[~(model.remaining > 0.0)]
     for failed in (None, *total) if model.report_failures else (None,):
         if failed is not None:
             health[failed] = 0.0
         lower, upper = (limit * health for limit in (limits if limits is not None else own))
-        stages.append(Allocation(vehicle.thruster_matrix, lower, upper, mode).arguments)
+        stages.append(Allocation(vehicle.thruster_matrix, lower, upper, mode, rights).arguments)
     inverse, lower, upper, direction = zip(*stages, strict=True)
     return Allocator(np.array(inverse), np.array(lower), np.array(upper), direction[0])

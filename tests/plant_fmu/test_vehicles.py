@@ -51,7 +51,9 @@ def test_vehicle_parameters_are_physically_valid(name):
     assert moments[2] <= moments[0] + moments[1]  # true of every body
     assert vehicle.weight == pytest.approx(9.81 * vehicle.mass, rel=0.002)
     assert vehicle.buoyancy == pytest.approx(vehicle.weight, rel=0.02)
-    assert np.linalg.matrix_rank(vehicle.thruster_matrix) == 6
+    driven = np.delete(vehicle.thruster_matrix, 4, axis=0) if name == "bluerov2" else vehicle.thruster_matrix
+    assert np.linalg.matrix_rank(driven) == len(driven)  # the six-thruster one leaves pitch to the righting moment
+    assert vehicle.righting_moment > 0.0
     assert (vehicle.thrust_min < 0).all() and (vehicle.thrust_max > 0).all()
 
 
@@ -104,6 +106,36 @@ def test_bluerov2_thruster_positions_match_the_source():
     upright = [((x, y, 0.0), (0, 0, -1)) for x in (0.12, -0.12) for y in (0.218, -0.218)]
     expected = [np.array([*d, *np.cross(r, d)]) / np.linalg.norm(d) for r, d in level + upright]
     np.testing.assert_allclose(load_vehicle("bluerov2_heavy").thruster_matrix, np.array(expected).T, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "vertical"), [("bluerov2", [(0.0, 0.109)]), ("bluerov2_heavy_trimmed", [(0.118, 0.215), (-0.118, 0.215)])]
+)
+def test_bluerov2_ignition_thrusters_and_centers_match_the_source(name, vertical):
+    """Its configs.yaml, from its center of gravity 0.011 m above the level thrusters; x forward, y left, z up there."""
+    level = [((x, y, 0.011), (np.sign(x), -np.sign(y), 0)) for x in (0.14, -0.15) for y in (0.092, -0.092)]
+    upright = [((x, side * y, 0.0), (0, 0, -1)) for x, y in vertical for side in (1, -1)]
+    expected = [np.array([*d, *np.cross(r, d)]) / np.linalg.norm(d) for r, d in level + upright]
+    vehicle = load_vehicle(name)
+    np.testing.assert_allclose(vehicle.thruster_matrix, np.array(expected).T, atol=1e-12)
+    np.testing.assert_array_equal(vehicle.r_G, 0)
+
+
+def test_bluerov2_follows_ardusubs_frame_vectored():
+    """Roll, yaw, throttle (up), forward and lateral factor of each motor in AP_Motors6DOF.cpp, SUB_FRAME_VECTORED."""
+    motors = [
+        (0, 1, 0, -1, 1),
+        (0, -1, 0, -1, -1),
+        (0, -1, 0, 1, 1),
+        (0, 1, 0, 1, -1),
+        (1, 0, -1, 0, 0),
+        (-1, 0, -1, 0, 0),
+    ]
+    vehicle = load_vehicle("bluerov2")
+    assert vehicle.autopilot.frame == "vectored" and vehicle.autopilot.sign_of_each(6) == (-1,) * 6
+    signs = -np.sign(np.where(np.abs(vehicle.thruster_matrix) > 0.05, vehicle.thruster_matrix, 0.0)).T
+    ours = [(roll, yaw, -down, forward, right) for forward, right, down, roll, _, yaw in signs]
+    np.testing.assert_array_equal(ours, motors)
 
 
 def test_rexrov_body_is_that_of_uuv_simulator():

@@ -72,10 +72,15 @@ def measure_moment(
 
 
 def update_desired(
-    attitude: Attitude, regions: PackedRegions, position: Vector3, gains: DeployableGains, period: float
+    attitude: Attitude,
+    regions: PackedRegions,
+    position: Vector3,
+    metric: Vector6,
+    gains: DeployableGains,
+    period: float,
 ) -> None:
     """Turn the desired attitude towards the preferred one, or until regions of attitude have their comfort."""
-    # Units of arguments: position [m, NED]; period [s]
+    # Units of arguments: position [m, NED]; period [s]. No turn about axes whose `metric`, as of `Thrusters`, is 0.
     e, gradient = error(attitude.preferred, attitude.desired), zeros(3)  # desired = preferred * back
     omega = -2.0 * _RETURN * e[1:]
     limited = False
@@ -92,6 +97,7 @@ def update_desired(
                 omega += _TURN * (gains.comfort - clearance) * down_in_body(attitude.desired)
     if not limited and e[0] > 1.0 - 1e-15:
         return
+    omega[:] = np.where(metric[3:] > 0.0, omega, 0.0)
     size = norm(omega)
     if size > gains.turning_rate:
         omega *= gains.turning_rate / size

@@ -22,12 +22,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.arithmetic import exponential, square
+from controller.arithmetic import exponential, sine, square
 from controller.laws.deployable.attitude import integrate_attitude
 from controller.laws.deployable.attraction import approach_speed
 from controller.laws.deployable.faces import FACES, face_ahead, has_faces
 from controller.laws.deployable.gains import SPREADS, DeployableGains
-from controller.linear_algebra import norm
+from controller.linear_algebra import cross, norm
 from controller.quadratic_program import Workspace
 from controller.regions.kinds import FIRST_OF_ATTITUDE, FLAT
 from controller.regions.region_set import PackedRegions, evaluate_packed, position_clearance
@@ -41,6 +41,7 @@ _FD_STEP = 1e-4  # s, step of the difference quotient of a gradient: relative er
 _FIRM = (3.0, 3.0)  # decades by which slack costs more than missing the desired force: at weight 0; added at weight 1
 _LEAP = 0.5  # cosine of a gradient's turn within `_FD_STEP` below which the turn counts as a jump
 _MARGIN_OF_ATTITUDE = 0.02  # rad, margin of regions of attitude
+_TILT_PRICE = 1e-5  # price of a violated bound on tilt, times the squared inertia: below those of hard regions
 KEPT = 0.01  # m/s2, slack up to which a barrier counts as kept
 _BOUND_LEAP = 0.05  # m, fall of the bound in a step that counts as a jump: more than the vehicle's motion can cause
 
@@ -231,6 +232,44 @@ def add_row(
         return rows
     work.rhs[rows], work.price[rows] = rhs, price
     return rows + 1
+
+
+def write_tilt_rows(
+    work: Workspace,
+    rows: int,
+    metric: Vector6,
+    down: Vector3,
+    motion: Motion,
+    lower: Array,
+    upper: Array,
+    gains: DeployableGains,
+) -> int:
+    """Add the constraint of the tilt about each axis that is left to the righting moment; return the number of rows."""
+    # `down` is the vertical k in body axes: pitch tilts k_x, and roll k_y. h = sin(tilt) - |k_x| is a barrier as those
+    # of regions, but yields to them: no promise rests on it. It keeps thrusters from tilting the vehicle, and never
+    # asks them to right it, for which they may have a short arm alone.
+    omega, n = motion.velocity[3:], zeros(6)
+    turning = cross(down, omega)  # dk/dt
+    for axis in range(3, 5):
+        if metric[axis] > 0.0:
+            continue
+        i = 4 - axis  # k_x' = k_y r - k_z q, k_y' = k_z p - k_x r
+        sign = (1.0 if down[i] > 0.0 else -1.0) * (1.0 if i == 0 else -1.0)
+        n[:] = 0.0
+        n[axis] = sign * down[2]
+        rate = n[axis] * omega[axis - 3] - sign * down[1 - i] * omega[2]
+        curve = sign * (turning[2] * omega[axis - 3] - turning[1 - i] * omega[2])
+        h = sine(gains.tilt) - abs(down[i])
+        allowed = approach_speed(h, gains.turning_deceleration, gains.barrier_slope)
+        slope = gains.barrier_slope
+        if h > 0.0:
+            slope = gains.turning_deceleration / (allowed + gains.turning_deceleration / gains.barrier_slope)
+        rhs = -gains.barrier_rate * (rate + allowed) - slope * rate - n[axis] * motion.free_acceleration[axis] - curve
+        rhs = min(rhs, 0.0)
+        rows = add_row(
+            work, rows, n, motion.thruster_acceleration, rhs, _TILT_PRICE / square(motion.inertia), lower, upper
+        )
+    return rows
 
 
 def vehicle_bound(regions: PackedRegions, position: Vector3, motion: Motion, gains: DeployableGains) -> float:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from controller import quadratic_program
-from controller.arithmetic import square
+from controller.arithmetic import sine, square
 from controller.law import (
     Array,
     CompiledLaw,
@@ -37,8 +37,9 @@ from controller.laws.deployable.barrier import (
     update_guarantee,
     vehicle_bound,
     write_rows,
+    write_tilt_rows,
 )
-from controller.laws.deployable.braking import least_forces
+from controller.laws.deployable.braking import greatest_speed, least_forces
 from controller.laws.deployable.diagnostics import (
     DIAGNOSTICS,
     NO_BOUND,
@@ -61,7 +62,7 @@ from controller.quadratic_program import empty_workspace
 from controller.quaternion import rotation_matrix
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_at
-from controller.stack_array import Matrix3, Vector3, array, zeros
+from controller.stack_array import Matrix3, Vector3, Vector6, array, zeros
 
 _STALE = 0.15  # s without a measurement after which the speed is reduced
 _TRUSTED_SPREAD = 0.3  # m, `SPREADS` deviations of the position above which the speed is reduced; it is 0 at twice that
@@ -84,6 +85,7 @@ def step(
 ) -> None:
     """Run a step of the deployable law, as specified by `CompiledLaw.step`; `forces` are those of the thrusters [N]."""
     estimate, thrusters, dynamics, period = memory.state_estimate, memory.thrusters, memory.dynamics, memory.period
+    gains = gains._replace(speed=min(gains.speed, dynamics.max_speed))
     input_validation.smooth_weights(weights, memory.weights, regions.hard, period / (period + gains.price_smoothing))
     # estimate
     input_validation.process_measurement(memory, state, gains)
@@ -141,7 +143,7 @@ def step(
     else:
         go_straight(memory.plan, ahead.position, goal_ahead, limits)
     desired = desired_velocity(memory.plan, ahead.position, goal.velocities[0], gains)
-    _limit_speed(estimate, spread, gains, desired)
+    _limit_speed(estimate, spread, thrusters.metric, R[2], gains, desired)
 
     # desired wrench
     observe_regions(memory.observation, regions_ahead, ahead.position, ahead.quaternion, ahead.velocity)
@@ -152,7 +154,7 @@ def step(
     deep = min(clearance_at(goal_ahead, 0, memory.plan.path[memory.plan.points - 1]), gains.depth)
     entered = min(max(clearance_at(goal_ahead, 0, ahead.position) / max(deep, _SHALLOWEST), 0.0), 1.0)
     pushed = _soft_forces(memory.observation, regions, memory.weights[1], desired, entered, dynamics)
-    attitude_loop.update_desired(memory.attitude, regions_ahead, ahead.position, gains, period)
+    attitude_loop.update_desired(memory.attitude, regions_ahead, ahead.position, thrusters.metric, gains, period)
     moment = attitude_loop.compute_moment(memory.attitude, dynamics, ahead.quaternion, omega, against, gains)
     wrench = np.concatenate((force + R_ahead.T @ pushed, moment))
     work = memory.program
@@ -187,9 +189,10 @@ def step(
         )  # fmt: skip
         vehicle = vehicle_bound(regions, estimate.position, motion, gains)
         memory.observation.bound = min(memory.observation.bound, vehicle)
+    constraints = write_tilt_rows(work, rows, thrusters.metric, R_ahead[2], motion, lower, upper, gains)
 
     # quadratic program
-    steps = quadratic_program.solve(work, rows, thrusters.inverse, lower, upper, forces)
+    steps = quadratic_program.solve(work, constraints, thrusters.inverse, lower, upper, forces)
     model.command_forces(thrusters, forces)
     thrusters.forces = forces
     memory.estimate[0] = estimate.net_weight
@@ -211,15 +214,22 @@ def _hold_weight(memory: DeployableMemory, R: Matrix3, gains: DeployableGains, f
     forces[:] = np.clip(thrusters.allocator @ wrench, thrusters.lower, thrusters.upper)
 
 
-def _limit_speed(estimate: Estimate, spread: float, gains: DeployableGains, desired: Vector3) -> None:
+def _limit_speed(
+    estimate: Estimate, spread: float, metric: Vector6, down: Vector3, gains: DeployableGains, desired: Vector3
+) -> None:
     """Limit the desired velocity so that the vehicle can stop before `coast` ends or the position is too uncertain."""
-    # `spread` is the uncertainty of the position [m].
+    # `spread` is the uncertainty of the position [m]. The speed also falls beyond half the greatest tilt about an axis
+    # that is left to the righting moment; `down` is the vertical in body axes.
     gap = max(estimate.time_since_measurement, estimate.longest_gap)
     max_speed = gains.speed
     if gap > _STALE:
         max_speed = min(max_speed, gains.acceleration * max(gains.coast - gap, 0.0))
     if spread > _TRUSTED_SPREAD:
         max_speed = min(max_speed, gains.speed * max(2.0 - spread / _TRUSTED_SPREAD, 0.0))
+    for axis in range(3, 5):
+        if metric[axis] == 0.0:
+            tilt = abs(down[4 - axis]) / sine(gains.tilt)
+            max_speed = min(max_speed, gains.speed * max(2.0 - 2.0 * tilt, 0.0))
     speed = norm(desired)
     if speed > max_speed:
         desired *= max_speed / speed
@@ -280,13 +290,13 @@ class DeployableLaw(CompiledLaw):
             m=m,
             period=validate_period(period),
             report=Report.over(np.zeros(len(DIAGNOSTICS))),
-            dynamics=make_dynamics(vehicle, least_forces(vehicle)),
+            dynamics=make_dynamics(vehicle, least_forces(vehicle, gains.tilt), greatest_speed(vehicle, gains.tilt)),
             thrusters=make_thrusters(vehicle),
             state_estimate=make_estimate(vehicle),
             attitude=empty_attitude(desired),
             fault_state=FaultState(m=m, h=2 * m),
             plan=empty_plan(n_regions, _SEED),
-            program=empty_workspace((1 + FACES) * n_regions, m),
+            program=empty_workspace((1 + FACES) * n_regions + 2, m),
         )
         memory.quaternion, memory.predicted.quaternion[0] = desired, 1.0
         memory.expected[:] = memory.weights[:] = np.nan

@@ -24,7 +24,7 @@ class DeployableGains(NamedTuple):
     attitude_bandwidth: float = 2.0  # rad/s
     # attitude required by regions
     comfort: float = 0.15  # rad, clearance of regions of attitude that the held attitude keeps
-    tilt: float = 0.35  # rad, greatest from the vertical that a region may ask for
+    tilt: float = 0.35  # rad, greatest from the vertical that a region may ask for, or about an axis left to righting
     turning_rate: float = 0.6  # rad/s, greatest of the held attitude
     turning_deceleration: float = 0.5  # rad/s2, relied on by barriers of attitude
     # barriers

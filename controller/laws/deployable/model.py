@@ -6,6 +6,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from controller.driven_axes import require_driven
 from controller.law import VehicleModel
 from controller.laws.deployable.thrust_limit import command_for, limited_force
 from controller.linear_algebra import cross, invert_symmetric
@@ -29,6 +30,7 @@ class Dynamics(NamedTuple):
     translational_mass: float  # kg, mean over the three axes
     rigid_mass: float  # kg, without added mass
     braking: Array  # (m + 1,) m/s2, worst direction: with thruster j lost, and last with all working
+    max_speed: float = np.inf  # m/s, through water, at which the righting moment still holds axes that are left to it
 
 
 class Thrusters(State):
@@ -45,7 +47,9 @@ class Thrusters(State):
     nominal_upper: VectorM  # N, upper limits of the vehicle
     inverse: MatrixM  # H^-1 with H = B^T Q B + regularization
     allocator: Allocator  # H^-1 B^T Q: maps a wrench to its least-squares forces
-    metric: Vector6  # 1/N2, 1/(N m)2: Q, cost of an error of the wrench
+    metric: Vector6  # 1/N2, 1/(N m)2: Q, cost of an error of the wrench; 0: left to the righting moment
+    nominal_metric: Vector6  # Q with all thrusters working
+    rights: float  # 1 if axes of rotation may be left to the righting moment, else 0
     health: VectorM  # 1 working, 0 failed
     stuck: VectorM  # N, constant force of a stuck thruster; NaN for all others
     effectiveness: VectorM  # estimated ratio of each thruster's force to the commanded one
@@ -55,8 +59,8 @@ class Thrusters(State):
     acting_now: VectorM  # N, forces behind the lag at its end
 
 
-def make_dynamics(vehicle: VehicleModel, braking: Array) -> Dynamics:
-    """Return the constants of a vehicle; braking (m + 1,) [N]."""
+def make_dynamics(vehicle: VehicleModel, braking: Array, max_speed: float = np.inf) -> Dynamics:
+    """Return the constants of a vehicle; braking (m + 1,) [N], max_speed [m/s]."""
     mass = vehicle.rigid_mass + vehicle.added_mass
     mean = float(np.trace(mass[:3, :3])) / 3.0
     inverse = 0.5 * (mass + mass.T)
@@ -69,6 +73,7 @@ def make_dynamics(vehicle: VehicleModel, braking: Array) -> Dynamics:
         translational_mass=mean,
         rigid_mass=float(vehicle.rigid_mass[0, 0]),
         braking=np.asarray(braking) / mean,
+        max_speed=max_speed,
     )
 
 
@@ -84,8 +89,10 @@ def make_thrusters(vehicle: VehicleModel) -> Thrusters:
         upper=vehicle.thrust_max.copy(),
         nominal_lower=vehicle.thrust_min.copy(),
         nominal_upper=vehicle.thrust_max.copy(),
-        metric=np.array([1.0] * 3 + [4.0 / arm**2] * 3),
+        nominal_metric=np.array([1.0] * 3 + [4.0 / arm**2] * 3),
+        rights=float(vehicle.righting_moment > 0.0),
     )
+    thrusters.nominal_metric[require_driven(B, vehicle.thrust_min, vehicle.thrust_max, vehicle.righting_moment)] = 0.0
     thrusters.health[:] = thrusters.effectiveness[:] = 1.0
     thrusters.stuck[:], thrusters.ceiling[0] = np.nan, 2.0
     interpret(reallocate, (thrusters,))
@@ -93,11 +100,39 @@ def make_thrusters(vehicle: VehicleModel) -> Thrusters:
 
 
 def reallocate(thrusters: Thrusters) -> None:
-    """Update matrix, limits and inverses from `health` and `stuck`."""
-    t, H = thrusters, thrusters.inverse
+    """Update matrix, limits and inverses from `health` and `stuck`; leave lost axes if that saves others."""
+    t = thrusters
     t.matrix = t.nominal_matrix * np.where(np.isnan(t.stuck), t.health, 1.0)
     t.lower = np.where(np.isnan(t.stuck), t.nominal_lower * t.health, t.stuck)
     t.upper = np.where(np.isnan(t.stuck), t.nominal_upper * t.health, t.stuck)
+    t.metric = t.nominal_metric
+    _invert(t)
+    lost = _lost_axes(t)
+    for k in range(2):
+        axis = 4 - k  # pitch before roll
+        if t.rights > 0.0 and lost > 0.5 and t.metric[axis] > 0.0:
+            t.metric[axis] = 0.0
+            _invert(t)
+            remaining = _lost_axes(t)
+            if remaining < lost - 0.5:
+                lost = remaining
+            else:
+                t.metric[axis] = t.nominal_metric[axis]
+                _invert(t)
+
+
+def _lost_axes(thrusters: Thrusters) -> float:
+    """Return the number of axes that the allocation cannot drive alone, of those that are not left."""
+    lost, t = 0.0, thrusters
+    for axis in range(6):
+        if t.metric[axis] > 0.0:
+            lost += 1.0 - t.matrix[axis] @ t.allocator[:, axis]
+    return lost
+
+
+def _invert(thrusters: Thrusters) -> None:
+    """Update both inverses from matrix and metric."""
+    t, H = thrusters, thrusters.inverse
     H[:] = (t.matrix.T * t.metric) @ t.matrix
     for j in range(t.health.size):
         column = t.nominal_matrix[:, j]

@@ -17,18 +17,16 @@ from cosim.campaigns.scenes.scene_tables import sphere_table
 from cosim.scenario.scenario import Scenario, validate_scenario
 from plant_fmu.vehicle import load_vehicle
 
-VEHICLE = "odin"  # vehicle of scenes that name none
-
 
 def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions) -> Scenario:
     """Convert a scene to a scenario."""
     name = f"{Path(law).name}-scene-{scene.seed}"
     if isinstance(scene, ScenarioScene):
         return scene.with_law(law_table(law, gains), name, _changes(scene, conditions))
-    vehicle = load_vehicle(VEHICLE)
+    vehicle = load_vehicle(scene.vehicle)
     table = {
         "title": f"Scene {scene.seed}",
-        "vehicle": VEHICLE,
+        "vehicle": scene.vehicle,
         "time": {
             "duration": conditions.controls * conditions.control,
             "step": conditions.plant_step,

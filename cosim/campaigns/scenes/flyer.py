@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cosim.batch.fused import fly_scenario
-from cosim.campaigns.scenes.as_scenario import VEHICLE, scene_scenario
+from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import fmu_table, gains_from, law_class
 from cosim.campaigns.scenes.scenario_scene import AnyScene
+from cosim.campaigns.scenes.scene import ODIN
 from cosim.results.record import Rows
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_vehicle
@@ -89,13 +90,13 @@ class SceneFlyer:
         self.law = law
         self.conditions = conditions or Conditions()
         self.gains = gains_from(law) if gains is None else gains
-        vehicle = load_vehicle(VEHICLE)
+        vehicle = load_vehicle(ODIN)
         if fmu_table(law) is None:
             model, level = vehicle_model(vehicle), np.array(_LEVEL)
             law_class(law).for_vehicle(model, self.gains, level, self.conditions.control, 0)  # refuses invalid gains
         self._fmus: dict[str, FmuLaw] = {}  # the law for each vehicle
         self._clock = Clock()
-        self._plants = {VEHICLE: Plant(vehicle)}
+        self._plants = {ODIN: Plant(vehicle)}
 
     def fly(self, scene: AnyScene, trace: bool = False) -> tuple[Score, Rows]:
         """Fly one scene.

@@ -16,14 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.campaigns.scenes.conflicts import make_conflict
+from cosim.campaigns.scenes.scene import ODIN
 from cosim.campaigns.scenes.trials import make_trial
+from cosim.errors import ScenarioError
+from plant_fmu.vehicle import Vehicle, load_vehicle
 
 MAX_OBSTACLES = {"plain": 6, "hard": 14}  # maximum number of obstacles of each kind of scene
 _GOAL_RADIUS = 0.5  # m
 _FREE = 0.6  # m, minimum distance of an obstacle from the start and from the goal region
 
 
-def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[str]:
+def generate_scenes(count: int, seed: int = 0, kind: str = "plain", vehicle: str | None = None) -> Iterator[str]:
     r"""Generate scenes with successive seeds.
 
     Parameters
@@ -34,11 +37,18 @@ def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[
         Seed of the first scene, 0 or above.
     kind : {"plain", "hard", "conflict", "tour", "trial", "mismatch"}
         Kind of all scenes; the last four as in the modules `conflicts`, `trials` and `mismatches`.
+    vehicle : str, optional
+        Vehicle of plain and hard scenes, a shipped name or a TOML file; default: ODIN. The other kinds draw theirs.
 
     Yields
     ------
     str
         Scene as a line of JSON for `cosim.campaigns.scenes.scene_file.read_scenes`.
+
+    Raises
+    ------
+    ScenarioError, VehicleError
+        If the kind takes no vehicle, or there is no such vehicle.
 
     Examples
     --------
@@ -48,14 +58,31 @@ def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[
     >>> len(list(cosim.read_scenes(Path("scenes.jsonl"))))
     2
     """
+    if vehicle and kind not in MAX_OBSTACLES:
+        raise ScenarioError(
+            f"kind is {kind!r}, whose scenes draw their vehicles, expected plain or hard with a vehicle"
+        )
+    of = {"vehicle": load_vehicle(vehicle), "name": vehicle} if vehicle else {}
     for one in range(seed, seed + count):
-        yield json.dumps(MAKERS[kind](one))
+        yield json.dumps(MAKERS[kind](one, **of))
 
 
-def make_scene(seed: int, kind: str = "plain") -> dict[str, Any]:
-    """Make the scene of a seed."""
+def make_scene(
+    seed: int, kind: str = "plain", vehicle: Vehicle | None = None, name: str | None = None
+) -> dict[str, Any]:
+    """Make the scene of a seed, for ODIN or a vehicle by its name or file."""
     rng = np.random.default_rng([20261121, seed, int(kind == "hard")])
-    return draw_scene(rng, itertools.repeat(rng), seed, kind)
+    scene = draw_scene(rng, itertools.repeat(rng), seed, kind)
+    if vehicle is None:
+        return scene
+    # restoring forces and moments in proportion to the vehicle's; its thrusters fail alike
+    odin = load_vehicle(ODIN)
+    scene["vehicle"] = name
+    scene["weight_minus_buoyancy"] *= vehicle.weight / odin.weight
+    scene["righting_moment"] *= vehicle.righting_moment / odin.righting_moment
+    if failure := scene["failed_thruster"]:
+        failure["index"] = 1 + failure["index"] % vehicle.n_thrusters
+    return scene
 
 
 def draw_scene(rng: Any, of_obstacles: Iterable[Any], seed: int, kind: str) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from cosim.errors import ScenarioError
 from plant_fmu.toml_tables import NonNegative, Table
 from plant_fmu.vehicle import Vehicle
 
+ODIN = "odin"  # vehicle of scenes that name none
 Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 Moderate = Annotated[float, Meta(ge=-GREATEST, le=GREATEST)]
 Radius = Annotated[float, Meta(gt=0.0, le=GREATEST)]
@@ -64,6 +65,7 @@ class Scene(Table, frozen=True):
     righting_moment: float  # N m: z_G W - z_B B
     noise: Noise = Noise()
     failed_thruster: Failure | None = None
+    vehicle: str = ODIN  # shipped name, or TOML file
 
 
 def scene_regions(scene: Scene) -> list[tuple[Region, str]]:

@@ -96,7 +96,7 @@ def test_held_attitude_returns_at_one_fifth_per_second():
         back = Rotation.from_rotvec(rng.normal(size=3) * 0.02)
         x, y, z, w = (rotation(attitude.preferred) * back).as_quat()
         attitude.desired[:] = w, x, y, z
-        loop.update_desired(attitude, pack([]), NOWHERE, gains, PERIOD)
+        loop.update_desired(attitude, pack([]), NOWHERE, np.ones(6), gains, PERIOD)
         expected = rotation(attitude.preferred) * Rotation.from_rotvec(back.as_rotvec() * (1.0 - 0.2 * PERIOD))
         assert apart(attitude.desired, expected) < 1e-6 * back.magnitude() + 1e-9
 
@@ -105,7 +105,7 @@ def test_held_attitude_is_constant_bit_for_bit():
     rng = np.random.default_rng(10)
     for _ in range(50):
         attitude = loop.empty_attitude(random_unit(rng))
-        loop.update_desired(attitude, pack([]), NOWHERE, GAINS, PERIOD)
+        loop.update_desired(attitude, pack([]), NOWHERE, np.ones(6), GAINS, PERIOD)
         assert np.array_equal(attitude.desired, attitude.preferred)
 
 
@@ -141,7 +141,12 @@ def test_desired_attitude_moves_into_attitude_regions():
         ]
         expected = after(attitude.desired, asked_turn(attitude, regions, position), 1e-4)
         loop.update_desired(
-            attitude, pack([Region("ball", Sphere((1.0, 1.0, 1.0), 1.0), "out"), *regions]), position, gains, 1e-4
+            attitude,
+            pack([Region("ball", Sphere((1.0, 1.0, 1.0), 1.0), "out"), *regions]),
+            position,
+            np.ones(6),
+            gains,
+            1e-4,
         )
         assert apart(attitude.desired, expected) < 1e-7
 
@@ -150,7 +155,7 @@ def test_half_a_turn_away_the_rotation_is_about_the_vertical():
     for held, away in (((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), ((0.96, 0.28, 0.0, 0.0), (0.0, 0.0, 0.8, -0.6))):
         attitude, regions = loop.empty_attitude(np.array(held)), pack([Region("back", Orientation(away, 0.1), "in")])
         before = attitude.desired.copy()
-        loop.update_desired(attitude, regions, NOWHERE, GAINS, PERIOD)
+        loop.update_desired(attitude, regions, NOWHERE, np.ones(6), GAINS, PERIOD)
         assert apart(attitude.desired, after(before, GAINS.turning_rate * down(before))) < 1e-6
 
 
@@ -167,7 +172,7 @@ def test_at_maximum_tilt_the_rotation_is_about_the_vertical():
         turn *= min(1.0, GAINS.turning_rate / np.linalg.norm(turn))
         free = after(attitude.desired, turn)
         before, k = attitude.desired.copy(), down(attitude.desired)
-        loop.update_desired(attitude, pack([region]), NOWHERE, GAINS, PERIOD)
+        loop.update_desired(attitude, pack([region]), NOWHERE, np.ones(6), GAINS, PERIOD)
         if free.as_matrix()[2, 2] < np.cos(GAINS.tilt) - 1e-6:
             tried += 1
             assert apart(attitude.desired, after(before, (k @ turn) * k)) < 1e-4 * np.linalg.norm(turn) * PERIOD + 1e-5

@@ -49,7 +49,7 @@ def expected(memory, state, goal, regions, weights):
     pushed = memory.filtered_acceleration + 0.02 / (0.02 + GAINS.smoothing) * (
         acceleration - free[:3] - memory.filtered_acceleration
     )
-    attitude.update_desired(memory.attitude, regions, position, GAINS, 0.02)
+    attitude.update_desired(memory.attitude, regions, position, np.ones(6), GAINS, 0.02)
     against = model.free_wrench(dynamics, R, velocity, turn, loads)
     moment = attitude.compute_moment(memory.attitude, dynamics, ahead.quaternion, turn, against, GAINS)
     wrench = np.r_[dynamics.mass[:3, :3] @ R.T @ pushed, moment]
