@@ -13,7 +13,7 @@ from cosim.mavlink.wire.options import LossAction
 from plant_fmu import Vehicle
 
 _HEAVY = "bluerov2_heavy"
-_VECTORED_6DOF, _CUSTOM_FRAME = 2.0, 7.0  # ArduSub's FRAME_CONFIG
+_FRAMES, _CUSTOM_FRAME = {"vectored": 1.0, "vectored_6dof": 2.0}, 7.0  # ArduSub's FRAME_CONFIG
 _SERVOS = 14
 _MOTORS = (*range(33, 41), *range(82, 86))  # ArduPilot's SERVOn_FUNCTION of motors 1 to 12
 _EXACT = 1e-6  # m/s2; offsets of exactly 0 are those of an accelerometer that was never calibrated
@@ -61,7 +61,7 @@ def _ardusub_parameters(vehicle: Vehicle) -> dict[str, float]:
     motors = _MOTORS[: vehicle.n_thrusters]
     functions = [*motors, *[0] * max(0, _SERVOS - len(motors))]
     return dict.fromkeys(_ARDUSUB_ZEROS, 0.0) | {
-        "FRAME_CONFIG": _VECTORED_6DOF if vehicle.name == _HEAVY else _CUSTOM_FRAME,
+        "FRAME_CONFIG": _FRAMES.get(vehicle.autopilot.frame, _CUSTOM_FRAME) if vehicle.autopilot else _CUSTOM_FRAME,
         **{f"SERVO{i}_FUNCTION": function for i, function in enumerate(functions, 1)},
         **{f"INS_ACCOFFS_{axis}": _EXACT for axis in "XYZ"},
         "FS_PILOT_INPUT": _WARN,

@@ -127,6 +127,8 @@ def test_the_frame_is_that_of_the_vehicle():
     heavy = scenario(name="pipe-inspection")
     assert heavy.vehicle.name == "bluerov2_heavy"
     assert value_of(Station("ardusub", of=heavy), "FRAME_CONFIG") == 2.0  # vectored_6dof
+    six_thrusters = scenario("vehicle=bluerov2", name="pipe-inspection")
+    assert value_of(Station("ardusub", of=six_thrusters), "FRAME_CONFIG") == 1.0  # vectored
     assert value_of(Station("px4", of=heavy), "SYS_AUTOSTART") == 60002.0
 
 

@@ -290,3 +290,10 @@ def test_check_command_prints_json(capsys):
     by_name = {finding["name"]: finding for finding in result["findings"]}
     assert by_name["(38) 1, 2"]["numbers"]["greatest_gradient"] is None  # everywhere
     assert by_name["(38) 1, 2"].keys() == {"topic", "name", "status", "text", "advice", "numbers"}
+
+
+def test_undriven_pitch_is_named_with_what_holds_it():
+    through = "vehicle=bluerov2", "actuation.through=thrusters"
+    finding = of_thrust(*through)["undriven axes"]
+    assert finding.status == "holds" and "do not drive pitch: a righting moment of 11.2 N m" in finding.text
+    assert of_thrust(*through, "plant.parameters.r_B.z=0.1")["undriven axes"].status == "fails"

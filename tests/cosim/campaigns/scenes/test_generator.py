@@ -32,6 +32,20 @@ def test_scenes_are_those_of_the_reference_to_the_last_digit(kind, capsys):
         assert json.dumps(scene) == json.dumps(reference)
 
 
+def test_scenes_of_another_vehicle_scale_its_restoring_forces_and_fail_its_thrusters(capsys):
+    ours, theirs = (
+        [json.loads(line) for line in printed(capsys, "--kind", "hard", "--count", 30, *flags).splitlines()]
+        for flags in ((), ("--vehicle", "bluerov2"))
+    )
+    for odin, rov in zip(ours, theirs, strict=True):
+        assert rov["vehicle"] == "bluerov2" and "vehicle" not in odin
+        assert rov["weight_minus_buoyancy"] == pytest.approx(odin["weight_minus_buoyancy"] * 111.83 / 1226.25, rel=0.01)
+        assert 1 <= rov["failed_thruster"]["index"] <= 6
+        assert rov["obstacles"] == odin["obstacles"]
+    assert main(["scenes", "--kind", "tour", "--vehicle", "bluerov2"]) == 2
+    assert "kind is 'tour', whose scenes draw their vehicles" in capsys.readouterr().err
+
+
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(("kind", "first"), [(kind, first) for kind, of in DIGESTS.items() for first in of])
 def test_two_hundred_scenes_are_those_of_the_reference(kind, first, capsys):

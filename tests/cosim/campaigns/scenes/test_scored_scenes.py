@@ -13,9 +13,9 @@ BASELINES = ["pd", "sun_cheah", "unarbitrated", "antonelli", "pid_cbf"]
 QUICKER = ["pid_cbf"]  # on plain scenes, and less thrifty
 
 
-def scores(law, first, count, hard=False, reported=False):
+def scores(law, first, count, hard=False, reported=False, vehicle=None):
     with SceneFlyer(law, Conditions(report_failures=reported)) as flyer:
-        scenes = generate_scenes(count, first, "hard" if hard else "plain")
+        scenes = generate_scenes(count, first, "hard" if hard else "plain", vehicle)
         return [flyer.fly(msgspec.json.decode(line, type=Scene))[0] for line in scenes]
 
 
@@ -27,6 +27,18 @@ def test_every_goal_is_reached_without_violation(hard, reported):
     flown = scores("deployable", 70_000, 40, hard, reported)
     assert min(score.min_clearance for score in flown) > 0.0
     assert all(score.reached and score.failed_step < 0 for score in flown)
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize(
+    ("hard", "count"),
+    [(True, 5), *(pytest.param(hard, 100, marks=pytest.mark.slow) for hard in (False, True))],
+)
+def test_six_thruster_vehicle_reaches_every_goal_without_violation(hard, count):
+    """Righting moments down to a sixth of the file's; hard scenes lose a thruster, which may leave roll as well."""
+    flown = scores("deployable", 72_000, count, hard, vehicle="bluerov2")
+    assert min(score.min_clearance for score in flown) > 0.0
+    assert all(score.reached and score.bound_excess <= 0.0 for score in flown)
 
 
 @pytest.mark.slow
