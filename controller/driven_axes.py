@@ -37,7 +37,7 @@ def left_axes(matrix: Array, lower: Array, upper: Array) -> list[list[int] | Non
         for left in _LEFT:
             if None not in result:
                 break
-            enough: list[bool] = driven_both_ways(matrix, lower, upper, left, least).all(axis=-1).tolist()
+            enough = [bool(driven.all()) for driven in driven_both_ways(matrix, lower, upper, left, least)]
             result = [left if axes is None and ok else axes for axes, ok in zip(result, enough, strict=True)]
     return result
 
