@@ -13,6 +13,7 @@ _MAX_STEP_BACK = 1.0  # s; a step back by more is a jump, not a message out of o
 _MAX_STEP_AHEAD = 3600.0  # s; a step ahead by more is a jump, not a pause
 _PAUSE = 1.0  # s, assumed duration of a jump
 _WINDOW = 60.0  # s of the vehicle's clock, in which only the message of smallest delay is used
+_PART = 2**14  # readings that are converted at once
 _MAX_LISTED = 12  # jumps that are listed
 _MAX_DRIFT = 5e-4  # relative drift above which a fit is discarded
 
@@ -42,7 +43,11 @@ class Clock:
         """Return the times [s] of clock readings [s], shape (n,); those of readings out of order are as they are."""
         if is_shuffled(readings[np.isfinite(readings)]):
             return readings
-        return np.array([self.time(reading) for reading in readings.tolist()])
+        times = np.empty(len(readings))
+        for first in range(0, len(readings), _PART):  # lists of numbers take four times the memory
+            part = slice(first, first + _PART)
+            times[part] = [self.time(reading) for reading in readings[part].tolist()]
+        return times
 
     def remarks(self, name: str) -> list[str]:
         """Return a sentence for each jump of a clock with a name."""

@@ -25,10 +25,11 @@ _LONGEST_HOLD = 0.95  # quantile of the lengths of holds, beyond which a value i
 
 def drop_duplicates(times: Array, keys: Keys) -> Index:
     """Return the indices of the samples without those that repeat time and value; `keys` stand for values."""
-    order: Index = np.argsort(times, kind="stable")
-    is_copy = np.zeros(len(times), bool)
-    is_copy[order[1:]] = (np.diff(times[order]) == 0.0) & (keys[order[1:]] == keys[order[:-1]])
-    index: Index = np.flatnonzero(~is_copy)
+    index: Index = np.arange(len(times))
+    order = np.argsort(times, kind="stable")
+    if (is_copy := (np.diff(times[order]) == 0.0) & (keys[order[1:]] == keys[order[:-1]])).any():
+        index = np.setdiff1d(index, order[1:][is_copy], assume_unique=True)
+    del order
     repeats, quick = _repeats(keys[index]), np.append(False, _is_quick(times[index]))
     changes = np.flatnonzero(~repeats[:-1])
     again = repeats & quick

@@ -24,6 +24,7 @@ _MAX_IMPLAUSIBLE = 0.1  # maximum fraction of implausible samples, which are lef
 _JUMP = 20.0  # usual changes between samples, beyond which a sample that its neighbors do not share is an outlier
 _AROUND = 7  # samples, width of the median that an outlier is compared with
 _NOT_SPIKY = ("position", "velocity_world", "velocity", "rates", "dvl", "depth", "altitude", "attitude", "fix")
+_SURVEYED = 2**14  # changes between samples that say how large these usually are
 _FROZEN, _FROZEN_SAMPLES = 1.0, 10  # s, samples: a sensor with noise that repeats a value longer is suspected
 
 
@@ -104,7 +105,8 @@ def _survey(source: Source, times: Callable[[Array, Array], Array]) -> tuple[Arr
         odd = np.uint64(2) * np.arange(source.size, dtype=np.uint64) + np.uint64(0x9E3779B97F4A7C15)
         with np.errstate(over="ignore"):
             keys.append(np.bitwise_xor.reduce(np.ascontiguousarray(values).view(np.uint64) * odd, axis=1))
-        changes.append(np.abs(np.diff(_continuous(source.quantity, values), axis=0))[:: max(1, source.count // BLOCK)])
+        steps = np.abs(np.diff(_continuous(source.quantity, values), axis=0))
+        changes.append(steps[:: max(1, source.count // _SURVEYED)].copy())
     pooled = np.concatenate(changes) if changes else np.zeros((0, source.size))
     usual = np.array([np.quantile(x[x > 0.0], 0.9) if np.any(x > 0.0) else np.inf for x in pooled.T])
     return np.concatenate(stamps or [np.zeros(0)]), np.concatenate(keys or [np.zeros(0, np.uint64)]), usual

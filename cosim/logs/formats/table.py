@@ -28,7 +28,7 @@ from cosim.simulation.signals import Array
 from plant_fmu.toml_tables import hint
 
 _ROWS = 2**15  # rows of a Parquet file that are read at once
-_BLOCK = 1 << 19  # bytes of a CSV file that are read at once; the reader is up to 32 such blocks ahead
+_BLOCK = 1 << 18  # bytes of a CSV file that are read at once; the reader is up to 32 such blocks ahead
 _MISSING = ["", "nan", "NaN", "NAN", "-nan", "null", "NULL", "None", "N/A", "n/a", "inf", "-inf"]
 _MARKS = {codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16", codecs.BOM_UTF8: "utf-8-sig"}
 _FLAGS = {"true": "1", "false": "0"}
