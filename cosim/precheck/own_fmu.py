@@ -20,16 +20,14 @@ def fmu_findings(scenario: Scenario, fmu: UserFmu) -> Iterator[Finding]:
     """Yield the findings on the FMU that is the law."""
     try:
         file = read_fmu_of(fmu)
-        targets, output, diagnostics = law_targets(fmu, file, scenario)
+        targets, output = law_targets(fmu, file, scenario)
         connected = connect(fmu, file, signal_units(scenario, Signals(columns_without_plant(scenario))))
     except ScenarioError as error:
         yield Finding("law", "FMU", "fails", str(error), "correct the map, or the FMU")
         return
     inputs = [v.name for v in file.model.values() if v.causality == "input"]
     free = [name for name in inputs if name not in connected]
-    text = (
-        f"{file.path.name} sets the {output} by {len(targets) - len(diagnostics)} outputs, from {len(connected)} inputs"
-    )
+    text = f"{file.path.name} sets the {output} by {len(targets)} outputs, from {len(connected)} inputs"
     yield Finding("law", "FMU", "holds", f"{text}; units and directions fit.")
     if free:
         yield Finding("law", "inputs", "note", f"{', '.join(free)}: not connected, and keep their start values.")

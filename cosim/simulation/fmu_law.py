@@ -9,7 +9,7 @@ import numpy as np
 
 from controller import Law
 from controller.compiling.function import BoundCall
-from controller.law import Array
+from controller.law import Array, Diagnostic
 from cosim.errors import ScenarioError
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
@@ -29,6 +29,8 @@ def make_law(scenario: Scenario) -> Law:
 class FmuLaw:
     """A co-simulation FMU that computes the forces; it fulfills the protocol `Law`, and C calls it."""
 
+    diagnostics: tuple[Diagnostic, ...] = ()
+
     def __init__(self, scenario: Scenario) -> None:
         assert scenario.law.fmu is not None
         self._scenario, self.fmu = scenario, scenario.law.fmu
@@ -37,10 +39,10 @@ class FmuLaw:
         self._progress = self._watchdog.progress
         try:
             self._file = read_fmu_of(self.fmu)
-            names, self.output, self.diagnostics = law_targets(self.fmu, self._file, scenario)
+            names, self.output = law_targets(self.fmu, self._file, scenario)
             self._plant = self._load()
             self._outputs, self._targets = tuple(names), np.array([*names.values()], np.int64)
-            self.estimate, self.report = np.zeros(4), np.zeros(len(self.diagnostics))
+            self.estimate, self.report = np.zeros(4), np.zeros(0)
             self.restart(scenario)
         except BaseException:
             self.close()
@@ -69,7 +71,7 @@ class FmuLaw:
         except PlantError as error:
             raise ScenarioError(f"time.control: {self.name}: {error}") from error
         self._progress[:] = 0.0
-        self.estimate[:], self.report[:] = 0.0, 0.0
+        self.estimate[:] = 0.0
 
     def _watched(self, act: Callable[[], Any]) -> Any:
         """Call a function of the FMU within its time limit."""

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 
-from controller.law import Diagnostic, Output
+from controller.law import Output
 from cosim.errors import ScenarioError
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import UserFmu
@@ -74,10 +74,8 @@ def connect(fmu: UserFmu, file: FmuFile, units: Mapping[str, str | None]) -> dic
     return connected
 
 
-def law_targets(
-    fmu: UserFmu, file: FmuFile, scenario: Scenario
-) -> tuple[dict[str, int], Output, tuple[Diagnostic, ...]]:
-    """Return what each output of a law sets, as in `FmuCalls.targets`, the kind of its forces, and its diagnostics."""
+def law_targets(fmu: UserFmu, file: FmuFile, scenario: Scenario) -> tuple[dict[str, int], Output]:
+    """Return what each connected output of a law sets, as in `FmuCalls.targets`, and the kind of its forces."""
     thrust = {f"thrust[{i + 1}]": "N" for i in range(scenario.vehicle.n_thrusters)}
     known = _WRENCH | thrust | _ESTIMATE
     targets: dict[str, str] = {}
@@ -94,7 +92,7 @@ def law_targets(
         target = next((name for name in names if name in known and name not in targets.values()), "")
         if target:
             _require_unit(f"{fmu.key}.outputs.{variable.name}", file, variable, known[target])
-        targets[variable.name] = target
+            targets[variable.name] = target
     of_thrusters, of_wrench = (any(t in names for t in targets.values()) for names in (thrust, _WRENCH))
     if of_thrusters == of_wrench:
         received = "set both wrench and thrust" if of_thrusters else "set no force"
@@ -103,16 +101,8 @@ def law_targets(
     if of_thrusters and scenario.actuation.through != "thrusters":
         received = repr(scenario.actuation.through)
         raise ScenarioError(f"actuation.through is {received}, expected 'thrusters': {file.path.name} drives them")
-    forces = thrust if of_thrusters else _WRENCH
-    free = [name for name, target in targets.items() if not target]
-    places = {name: i for i, name in enumerate((*forces, *_ESTIMATE, *free))}
-    variables = file.model
-    diagnostics = tuple(Diagnostic(name, variables[name].unit, variables[name].description) for name in free)
-    return (
-        {name: places[target or name] for name, target in targets.items()},
-        "thrusters" if of_thrusters else "wrench",
-        diagnostics,
-    )
+    places = {name: i for i, name in enumerate((*(thrust if of_thrusters else _WRENCH), *_ESTIMATE))}
+    return {name: places[target] for name, target in targets.items()}, "thrusters" if of_thrusters else "wrench"
 
 
 def _public(units: Mapping[str, str | None]) -> list[str]:

@@ -19,7 +19,7 @@ class FmuCalls(NamedTuple):
     native: Native  # inputs and outputs that are connected
     period: float  # s, length of its steps
     sources: Integers  # (i,) index in `signals` of each input
-    targets: Integers  # (o,) index among forces, estimate and report of each output
+    targets: Integers  # (o,) index among forces and estimate of each output
     signals: Array  # measured motion (13), weights (n), values (n + 1), clearances (n + 1), gradients (3 n + 3), row
     progress: Array  # (4,) steps done; 1 during a step; time of the run [s]; -1 for a failed step, else 1 + the output
     # that is not finite
@@ -44,9 +44,7 @@ def call_law(fmu: FmuCalls, model: StepModel, data: StepData, forces: Array) -> 
         return
     for i in range(fmu.targets.size):
         target, value = fmu.targets[i], native.outputs[i]
-        if target >= n + 4:
-            data.law.report[target - n - 4] = value
-        elif target >= n:
+        if target >= n:
             data.law.estimate[target - n] = value
             data.estimate[target - n] = value  # the FMU gives that with which it made the forces
         elif math.isfinite(value):
