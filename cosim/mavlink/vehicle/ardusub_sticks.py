@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from controller.driven_axes import undriven_axes
 from cosim.mavlink.wire.manual_control import clip_stick
 from cosim.scenario.region_tables import Vector6
 from cosim.simulation.signals import Array
@@ -30,6 +31,7 @@ class MotorMixer:
         self.commands: Array = np.where(
             size > _MIN_FRACTION * size.max(axis=1, keepdims=True), np.sign(self._matrix), 0.0
         ).T
+        self.commands[:, undriven_axes(self._matrix, vehicle.thrust_min, vehicle.thrust_max)] = 0.0
         # maximum force of each thruster [N], the mean of both directions
         self.max_forces: Array = 0.5 * (vehicle.thrust_max - vehicle.thrust_min)
         self.is_quadratic = table is not None and table.curve == "quadratic"

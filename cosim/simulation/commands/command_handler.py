@@ -9,6 +9,7 @@ from typing import assert_never
 import numpy as np
 
 from controller import VehicleState
+from controller.driven_axes import undriven_axes
 from cosim.errors import CommandError
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.actuation_limits import ActuationLimits
@@ -208,7 +209,8 @@ def greatest_wrench(vehicle: Vehicle) -> Array:
     inverse = np.linalg.pinv(vehicle.thruster_matrix)
     limit = np.minimum(-vehicle.thrust_min, vehicle.thrust_max)
     result = np.zeros(6)
-    for axis in range(6):
+    undriven = undriven_axes(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+    for axis in set(range(6)).difference(undriven):
         share = np.abs(inverse[:, axis])
         used = share > 1e-9 * max(1e-300, float(np.max(np.abs(inverse))))
         if np.any(used):

@@ -26,11 +26,13 @@ from cosim.companion.set_points import TurnLead, VelocityLead, make_attitude_mes
 from cosim.companion.sticks import make_manual_control, make_stick_scale, override_channels, release_channels
 from cosim.companion.vehicle_state import ReportedState, requested_rates
 from cosim.errors import RunError
+from cosim.mavlink.vehicle.ardusub_sticks import MotorMixer
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.thrust_body import get_thrust_body
+from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.commands import ManualControl
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import Station, scenario
@@ -621,3 +623,15 @@ def test_a_verb_lets_a_companion_hold_and_resume(capsys):
             over.set()
             thread.join()
     assert capsys.readouterr().err == f"cosim: udpout:127.0.0.1:{port}: no companion of system 255 answers\n"
+
+
+def test_sticks_of_six_thrusters_command_every_axis_but_pitch():
+    vehicle = load_vehicle("bluerov2")
+    assert greatest_wrench(vehicle)[4] == 0.0 and (np.delete(greatest_wrench(vehicle), 4) > 0.0).all()
+    mixer = MotorMixer(vehicle)
+    assert not mixer.commands[:, 4].any()  # ArduSub's frame vectored has no pitch
+    scale = make_stick_scale(vehicle, ARDUSUB, 1.0, "manual-control")
+    forces = np.array([6.0, -3.0, 4.0, 2.0, -5.0, 3.0])
+    wrench = vehicle.thruster_matrix @ forces
+    given = mixer.wrench(scale.sticks(wrench))
+    assert np.delete(given, 4) == pytest.approx(np.delete(wrench, 4), abs=0.02)
