@@ -71,7 +71,9 @@ def test_random_layout_is_driven_or_refused_by_its_axes(seed):
         return
     model = vehicle_model(vehicle)
     memory = law.for_vehicle(model, law.gains_type(), LEVEL, 0.02, 0).memory
-    assert np.flatnonzero(memory.thrusters.metric == 0.0).tolist() == left
+    thrusters = memory.thrusters  # leave as well what the regularized allocation would give by less than half
+    given = np.diag(thrusters.matrix @ thrusters.allocator)[thrusters.metric > 0.0]
+    assert (thrusters.metric[left] == 0.0).all() and (model.righting_moment == 0.0 or given.sum() > len(given) - 1.5)
     assert (memory.dynamics.braking > 0.0).all()
     allocation, forces = Allocation(B, *limits, rights=True), np.empty(B.shape[1])
     for axis in set(range(6)) - set(left) if (vehicle.thrust_min < 0.0).all() else ():
