@@ -122,7 +122,11 @@ def fit(
 
     Examples
     --------
-    See `Fit`.
+    >>> from fuzzy_arbiter import Constant, Output, System, Variable, auto_terms, fit
+    >>> x = Variable("x", (0, 1), auto_terms(["low", "high"]))
+    >>> y = Output("y", (0, 1), {"a": Constant(0)}, defuzzifier="average")
+    >>> fit(System([x], [y], ["if x is low or x is high then y is a"]), [[0], [1]], [4, 4], free="y.*").parameters
+    {'y.a.value': (0.0, 4.0)}
     """
     if not isinstance(system, System):
         raise DefinitionError(f"system is {shown(system)}, expected a System, such as arbiter.system")

@@ -31,7 +31,7 @@ def draw(tmp_path, monkeypatch):
 
 def shown():
     """Return the pictures that the pages show."""
-    return {name for page in PAGES for name in re.findall(r"\((?:docs/)?images/(.*?)\)", page.read_text())}
+    return {name for page in PAGES for name in re.findall(r"\((?:docs/|\.\./)?images/(.*?)\)", page.read_text())}
 
 
 def test_shown_pictures_and_existing_pictures_coincide():

@@ -111,7 +111,7 @@ def test_builds_are_reproducible(tmp_path, fmi, monkeypatch, capsys):
 
 
 def test_vehicles_are_listed_and_named_in_errors(build, capsys):
-    assert "bluerov2_heavy, bluerov2_heavy_wu, odin, rexrov" in build(vehicle="odyn")
+    assert "bluerov2, bluerov2_heavy, bluerov2_heavy_trimmed, bluerov2_heavy_wu, odin, rexrov" in build(vehicle="odyn")
     assert main(["list"]) == 0
     assert "unsourced" in capsys.readouterr().out
 

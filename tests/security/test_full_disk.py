@@ -42,7 +42,7 @@ def a_full_disk(of, monkeypatch):
 
 PLACES = {
     "the record": ["cosim.results.recorder.Recorder._write"],
-    "the vehicle's file": ["cosim.run.run_folder.shutil.copyfile"],
+    "the vehicle's file": ["cosim.run.run_folder.files_of"],
 }
 
 
@@ -53,13 +53,13 @@ def test_d9_command_succeeds_after_disk_space_is_freed(tmp_path, monkeypatch, of
     out, own = tmp_path / "run", scenario()
     if there:
         out.mkdir()
-    if "copyfile" in of[0]:
+    if "files_of" in of[0]:
         shutil.copy("plant_fmu/vehicles/odin.toml", tmp_path / "boat.toml")
         (tmp_path / "it.toml").write_text('base = "paper"\nvehicle = "boat.toml"\ntime.duration = 0.1')
         own = load_scenario(tmp_path / "it.toml")
     with a_full_disk(of, monkeypatch), pytest.raises(RunError, match="No space left") as caught:
         run_scenario(own, out, report=False)
-    kept = "" if "copyfile" in of[0] else "; nothing of the run is kept"
+    kept = "" if "files_of" in of[0] else "; nothing of the run is kept"
     assert str(caught.value) == f"{out}: No space left on device{kept}"
     assert out.exists() == there and not (there and any(out.iterdir()))
     assert run_scenario(own, out, report=False).summary["status"] == "completed"

@@ -12,6 +12,7 @@ from controller.law import VehicleModel
 
 Array = NDArray[np.float64]
 
+UNLIMITED = 1e3  # m/s, a speed that no vehicle reaches
 _NEGLIGIBLE = 1e-6  # force that counts as zero, as a fraction of the greatest limit
 _SHARE = 0.5  # fraction of the righting moment at the greatest tilt for thrusters, and for Munk's moment
 
@@ -44,12 +45,12 @@ def greatest_speed(vehicle: VehicleModel, tilt: float) -> float:
     # Munk's moment about pitch is (Z_w' - X_u') u w of the added masses, at most half their difference times the
     # squared speed; so is it about roll with Y_v'. It counts for axes that are left, with any one thruster lost.
     if not vehicle.righting_moment > 0.0:
-        return np.inf
+        return UNLIMITED
     B, A = vehicle.thruster_matrix, np.diag(vehicle.added_mass)
     works = ~np.eye(B.shape[1] + 1, B.shape[1], dtype=bool)
     left = left_axes(B, vehicle.thrust_min * works, vehicle.thrust_max * works)
     difference = max(abs(A[PITCH - axis] - A[2]) for axes in left for axis in axes or [])
-    return float(np.sqrt(2.0 * _tilting_moment(vehicle, tilt) / difference)) if difference > 0.0 else np.inf
+    return float(np.sqrt(2.0 * _tilting_moment(vehicle, tilt) / difference)) if difference > 0.0 else UNLIMITED
 
 
 def _tilting_moment(vehicle: VehicleModel, tilt: float) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 
 from controller.driven_axes import require_driven
 from controller.law import VehicleModel
+from controller.laws.deployable.braking import UNLIMITED
 from controller.laws.deployable.thrust_limit import command_for, limited_force
 from controller.linear_algebra import cross, invert_symmetric
 from controller.stack_array import Array, Columns6, Matrix3, Matrix6, Shape, Vector3, Vector6, VectorM, array, interpret
@@ -30,7 +31,9 @@ class Dynamics(NamedTuple):
     translational_mass: float  # kg, mean over the three axes
     rigid_mass: float  # kg, without added mass
     braking: Array  # (m + 1,) m/s2, worst direction: with thruster j lost, and last with all working
-    max_speed: float = np.inf  # m/s, through water, at which the righting moment still holds axes that are left to it
+    max_speed: float = (
+        UNLIMITED  # m/s, through water, at which the righting moment still holds axes that are left to it
+    )
 
 
 class Thrusters(State):
@@ -59,7 +62,7 @@ class Thrusters(State):
     acting_now: VectorM  # N, forces behind the lag at its end
 
 
-def make_dynamics(vehicle: VehicleModel, braking: Array, max_speed: float = np.inf) -> Dynamics:
+def make_dynamics(vehicle: VehicleModel, braking: Array, max_speed: float = UNLIMITED) -> Dynamics:
     """Return the constants of a vehicle; braking (m + 1,) [N], max_speed [m/s]."""
     mass = vehicle.rigid_mass + vehicle.added_mass
     mean = float(np.trace(mass[:3, :3])) / 3.0

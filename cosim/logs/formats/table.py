@@ -146,12 +146,13 @@ def _batches(
             block_size=_BLOCK,
             column_names=layout.names,
             skip_rows=layout.skipped,
-            encoding=layout.encoding,
             use_threads=False,
         )
         parse = pa.csv.ParseOptions(delimiter=layout.separator, invalid_row_handler=skip)
-        with contextlib.closing(pa.csv.open_csv(path, read, parse, convert)) as reader:
-            for batch in reader:
+        # decoded here: PyArrow does not pass rows that are no UTF-8 to `skip`
+        with path.open("rb") as file, contextlib.ExitStack() as stack:
+            text = codecs.EncodedFile(file, "utf-8", layout.encoding, "replace")
+            for batch in stack.enter_context(contextlib.closing(pa.csv.open_csv(text, read, parse, convert))):
                 done += _BLOCK
                 on_progress(min(1.0, done / total))
                 yield batch

@@ -201,6 +201,6 @@ def test_position_uncertainty_reduces_speed():
         own = law_for([])
         desired, seen = np.array([GAINS.speed, 0.0, 0.0]), own.memory.state_estimate
         seen.time_since_measurement = 0.0
-        deployable_law._limit_speed(seen, 3.0 * spread, GAINS, desired)
+        deployable_law._limit_speed(seen, 3.0 * spread, np.ones(6), np.array([0.0, 0.0, 1.0]), GAINS, desired)
         speeds.append(desired[0])
     assert speeds == pytest.approx([GAINS.speed, GAINS.speed, 0.5 * GAINS.speed, 0.0])

@@ -27,6 +27,8 @@ from cosim.precheck.path_search import find_path
 from cosim.precheck.stability import start_weights
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
+from cosim.ssp.controller import controller_component
+from plant_fmu.build import cached_fmu
 
 THROUGH_SENSORS = ["sensing.through=sensors", "sensing.position_noise=0.0", "sensing.velocity_noise=0.0"]
 SHORT = ["time.duration=0.1", "arbiter.engine=closed"]
@@ -71,6 +73,9 @@ def test_shipped_functions_are_exactly_those_called(called, tmp_path):
     Navigator(SensorModel(), state).step(0.0)
     start_weights(load_scenario("paper"))
     with Master(load_scenario("paper", SHORT), FunctionLaw(lambda *_: np.zeros(6))) as master:
+        master.run()
+    controller = cached_fmu(controller_component(load_scenario("paper", SHORT)), 3)
+    with Master(load_scenario("paper", [*SHORT, f"law.file={controller}"])) as master:
         master.run()
     find_path([], load_scenario("paper").goal_region, (0.0, 0.0, 0.0), DeployableGains(), 0.1)
     clearances_at(np.zeros((2, 3)), Region("ball", Sphere((0.0, 0.0, 0.0), 1.0), "out"))

@@ -230,12 +230,12 @@ def column_map(seeds: Seeds) -> Case:
     return seeds.file("map.toml", read_map, MAP)
 
 
-@reader("table of a log", "text", "cosim.logs.formats.table:_batches")
+@reader("table of a log", "text", "cosim.logs.formats.table:_batches", "cosim.logs.formats.table:_layout")
 def table_of_a_log(seeds: Seeds) -> Case:
     return _log(seeds, "it.csv", TABLE, columns=MAP)
 
 
-@reader("table of a log in Parquet", "parquet", "cosim.logs.formats.table:_batches")
+@reader("table of a log in Parquet", "parquet", "cosim.logs.formats.table:_batches", "cosim.logs.formats.table:_layout")
 def parquet_of_a_log(seeds: Seeds) -> Case:
     made = io.BytesIO()
     pq.write_table(pa.csv.read_csv(io.BytesIO(TABLE)), made)

@@ -30,7 +30,7 @@ from cosim.campaigns.store.row_log import RowLog
 from cosim.io.strict_json import json_text
 from cosim.replay.events import events_of
 from cosim.replay.page import is_page, write_page
-from cosim.replay.region_changes import changes_of
+from cosim.replay.region_changes import list_region_changes
 from cosim.replay.trace import trace_of
 from cosim.report.web_page import InlineFigure
 from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts, load_log_facts
@@ -65,7 +65,7 @@ def commands(seeds: Seeds) -> Case:
 
     def read(path: Path) -> None:
         log = read_log(path)
-        changes_of(run, log)
+        list_region_changes(run, log)
         events_of(run, log)
 
     return seeds.file("commands.jsonl", read, (seeds.run / "commands.jsonl").read_bytes())
@@ -77,7 +77,7 @@ def _thinned(folder: Path, rows: int) -> bytes:
     return made.getvalue()
 
 
-@reader("record", "parquet", "cosim.results.record:_opened", "cosim.results.record:_column_of")
+@reader("record", "parquet", "cosim.results.record:_open_source", "cosim.results.record:_column_of")
 def record(seeds: Seeds) -> Case:
     table = pq.read_table(seeds.run / RECORD).slice(0, 9)
     made = io.BytesIO()
@@ -92,7 +92,9 @@ def record(seeds: Seeds) -> Case:
     return seeds.file(RECORD, read, made.getvalue(), folder=True)
 
 
-@reader("record of a killed run", "bytes", "cosim.results.record:_opened", "cosim.results.record:_complete_batches")
+@reader(
+    "record of a killed run", "bytes", "cosim.results.record:_open_source", "cosim.results.record:_complete_batches"
+)
 def stream(seeds: Seeds) -> Case:
     table = pq.read_table(io.BytesIO(record(seeds).contents[0]))
     made = io.BytesIO()
@@ -101,7 +103,7 @@ def stream(seeds: Seeds) -> Case:
     return seeds.file(STREAM, lambda path: list(load_record(path.parent).blocks()), made.getvalue(), folder=True)
 
 
-@reader("run", "parquet", "cosim.results.record:_opened", "cosim.results.run_result:open_run")
+@reader("run", "parquet", "cosim.results.record:_open_source", "cosim.results.run_result:open_run")
 def run(seeds: Seeds) -> Case:
     """Make every output of a run, for any numbers."""
     folder, flown = seeds.folder(seeds.run), load_run(seeds.run)
@@ -144,7 +146,7 @@ def _with_its_scenario(seeds: Seeds, name: str) -> Case:
     return replace(case, read=read)
 
 
-@reader("plan of a sweep", "json", "cosim.io.strict_json:read_json", "cosim.campaigns.sweeps.sweep_rows:_files")
+@reader("plan of a sweep", "json", "cosim.io.strict_json:read_json")
 def plan_of_sweep(seeds: Seeds) -> Case:
     return _with_its_scenario(seeds, PLAN)
 

@@ -59,7 +59,7 @@ def command(seeds: Seeds) -> Case:
     return Case(tuple(json.dumps(command).encode() for command in COMMANDS_LOG), read)
 
 
-@reader("live view", "jsonl", "cosim.live.watching.run_views:_live", "cosim.live.viewer_messages:read_rows")
+@reader("live view", "jsonl", "cosim.live.watching.run_views:_follow_live", "cosim.live.viewer_messages:read_rows")
 def live_view(seeds: Seeds) -> Case:
     scenario = load_scenario("paper", ["commands.enabled=true", "commands.obstacles=2"])
     columns = load_columns(seeds)

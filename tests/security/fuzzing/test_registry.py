@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from plant_fmu import PlantError, unpacking
-from plant_fmu.running import instance
+from plant_fmu.model_variables import model_variables
 from tests.architecture.modules import FILES, tree_of
 from tests.security.fuzzing import files, folders, talkers
 from tests.security.fuzzing.registry import READERS
@@ -26,9 +26,9 @@ ITS_OWN = {  # what parses nothing that comes from outside: why
     "controller.compiling.text_cache:_read_cached": "a file of its own cache, in a folder that it alone can write to",
     "cosim.mavlink.wire.framing:encode_v1": "a frame that pymavlink has just encoded",
     "cosim.companion.failsafes:Failsafes.receive": "the four bytes of a number of a message",
-    "cosim.campaigns.rerun:_sweep_repeat": "a copy of the plan, which was read",
     "cosim.campaigns.store.folder:CampaignFolder.__init__": "a copy of its own plan",
-    "cosim.campaigns.sweeps.sweep_rows:_for_json": "a copy of its own plan",
+    "cosim.campaigns.sweeps.sweep_rows:SweepWork.__init__": "a copy of its own plan",
+    "cosim.campaigns.scenes.law_gains:fmu_table": "calls cosim.scenario.toml_file:read_table",
     "cosim.mavlink.services.parameter_protocol:ParameterProtocol._send_hash": "its own hash",
     "cosim.mavlink.services.parameter_protocol:_as_float32": "its own number",
     "cosim.mavlink.wire.thrust_body:get_thrust_body": "twelve bytes of a message with a valid checksum, padded",
@@ -46,6 +46,7 @@ ITS_OWN = {  # what parses nothing that comes from outside: why
     "plant_fmu.checking.__main__:main": "what its parent process wrote",
     "plant_fmu.checking.process:run_importer": "what its child process wrote",
     "plant_fmu.shared_library:_File.read": "libraries, which test_fmu_files cuts and edits",
+    "plant_fmu.running.messages:_format.next_float": "an argument of a message of a library that runs here",
     "plant_fmu.running.channels:_as_bools": "an array in memory",
 }
 
@@ -80,7 +81,7 @@ def test_every_parser_is_fuzzed_or_reads_own_files():
 @pytest.mark.parametrize("name", READERS)
 def test_unmodified_files_are_accepted_by_the_named_parsers(name, seeds):
     case, met = READERS[name].case(seeds), set()
-    for kept in (unpacking._cached_tree, instance._parse_description):  # which may have read the same before
+    for kept in (unpacking._cached_tree, model_variables):  # which may have read the same before
         kept.cache_clear()
 
     def seen(frame, event, argument):
