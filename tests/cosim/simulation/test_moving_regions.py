@@ -162,7 +162,7 @@ def test_streamed_region_on_a_circle_is_kept_behind_a_lag(vehicle, period):
     for lag in LAGS[1:]:
         circle = Circle(rng, period)
         table = flight(vehicle, lag, rng, regions=[circle.region, hard("depth", DEPTHS, "in")])
-        with Master(ScenarioScene(0, "moving", table).with_law("deployable", {}, {})) as circle.master:
+        with Master(ScenarioScene(0, "moving", table).with_law({"name": "deployable"}, "moving", {})) as circle.master:
             kept = Keep(circle.master)
             circle.master.run([kept, circle])
         clearance, bound = np.minimum(kept["ship.clearance"], kept["depth.clearance"]), kept["law.bound"]
