@@ -131,7 +131,7 @@ def prebuilt_of_eight(once):
     pytest.importorskip("ziglang", reason="the build extra is not installed: no binaries for other platforms")
     from plant_fmu.compiling import prebuilt
 
-    structure = prebuilt.shipped_structures()[0]
+    structure = next(s for s in prebuilt.shipped_structures() if s.constants["N_THRUSTERS"] == 8)
     folder = once("prebuilt-of-eight", lambda folder: prebuilt.write_prebuilt(structure, 3, "all", folder))
     return folder / prebuilt.file_name(structure, 3)
 

@@ -14,7 +14,7 @@ import sys
 import zipfile
 import zlib
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 from plant_fmu.archive import write_archive
@@ -25,7 +25,7 @@ from plant_fmu.compiling.signature import re_sign
 from plant_fmu.component import Component
 from plant_fmu.errors import BuildError
 from plant_fmu.variables import Variable
-from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
+from plant_fmu.vehicle import load_vehicle, shipped_vehicles
 from plant_fmu.vehicle_component import make_vehicle_component
 
 FOLDER = Path(__file__).parents[1] / "prebuilt"  # folder in a wheel; missing in a checkout
@@ -63,11 +63,8 @@ def prebuilt_libraries(
 
 def shipped_structures() -> list[Component]:
     """Return the components that prebuilt libraries are compiled from."""
-    # For the shipped vehicles, and for six thrusters.
-    vehicles = [load_vehicle(name) for name in shipped_vehicles()]
-    structures = [
-        make_general_component(make_vehicle_component(v)) for v in (*vehicles, _with_thrusters(vehicles[0], 6))
-    ]
+    vehicles = map(load_vehicle, shipped_vehicles())
+    structures = [make_general_component(make_vehicle_component(vehicle)) for vehicle in vehicles]
     return list({structure.constants["N_THRUSTERS"]: structure for structure in structures}.values())
 
 
@@ -81,12 +78,6 @@ def write_prebuilt(structure: Component, fmi: int, platforms: str, folder: Path)
     out = folder / file_name(structure, fmi)
     write_archive(out, {_member(platform): library for platform, library in libraries})
     return out
-
-
-def _with_thrusters(vehicle: Vehicle, n: int) -> Vehicle:
-    """Return a vehicle with the first few thrusters of another."""
-    names = [field.name for field in fields(vehicle) if field.name.startswith("thrust")]
-    return replace(vehicle, autopilot=None, **{name: getattr(vehicle, name)[..., :n] for name in names})
 
 
 def make_general_component(component: Component) -> Component:

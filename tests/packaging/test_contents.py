@@ -35,7 +35,7 @@ def project():
 
 def expected_libraries():
     structures = prebuilt.shipped_structures()
-    assert [structure.constants["N_THRUSTERS"] for structure in structures] == [8, 6]
+    assert sorted(structure.constants["N_THRUSTERS"] for structure in structures) == [6, 8]
     return {prebuilt.file_name(structure, fmi) for structure in structures for fmi in (2, 3)}
 
 

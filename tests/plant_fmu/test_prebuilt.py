@@ -32,13 +32,13 @@ def fmi():
 
 @pytest.fixture
 def folder(once, fmi):
-    """A folder as in a wheel, with this machine's libraries alone, of eight thrusters."""
+    """A folder as in a wheel, with this machine's libraries alone."""
 
     def make(folder):
-        general = prebuilt.make_general_component(make_vehicle_component(load_vehicle("rexrov")))
-        ((_, library),) = compiled_libraries(general, prebuilt.STAND_IN, fmi, [(HERE, find_compiler())])
-        with zipfile.ZipFile(folder / prebuilt.file_name(general, fmi), "w") as archive:
-            archive.writestr(f"{HERE.name}{HERE.suffix}", library)
+        for general in prebuilt.shipped_structures():
+            ((_, library),) = compiled_libraries(general, prebuilt.STAND_IN, fmi, [(HERE, find_compiler())])
+            with zipfile.ZipFile(folder / prebuilt.file_name(general, fmi), "w") as archive:
+                archive.writestr(f"{HERE.name}{HERE.suffix}", library)
 
     return once(f"prebuilt-here-{fmi}", make)
 
