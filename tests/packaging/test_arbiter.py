@@ -52,7 +52,7 @@ def test_arbiter_wheel_is_complete_and_disjoint_from_the_main_wheel(arbiter_whee
         )
     assert (fields["Name"], fields["License-Expression"]) == ("fuzzy-arbiter", "BSD-3-Clause")
     assert [text for text in fields.get_all("Requires-Dist") if "extra ==" not in text] == ["numpy>=2.1.3"]
-    assert set(fields.get_all("Provides-Extra")) == {"numba", "plot", "skfuzzy", "test"}
+    assert set(fields.get_all("Provides-Extra")) == {"numba", "plot", "skfuzzy", "test", "tune"}
 
 
 def test_readme_examples_need_only_numpy(alone):
