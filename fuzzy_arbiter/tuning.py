@@ -215,8 +215,8 @@ def _numbers_of(shape: Membership | Value, inputs: Sequence[str]) -> dict[str, f
 def _shape_of(shape: Membership | Value, numbers: Sequence[float]) -> Membership | Value:
     """Return a term with other numbers, in the order of `_numbers_of`."""
     if isinstance(shape, Shape):
-        moved = dict(zip(dict.fromkeys(x for x, _ in shape.points), numbers, strict=True))
-        return Shape(tuple((moved[x], degree) for x, degree in shape.points))
+        new_positions = dict(zip(dict.fromkeys(x for x, _ in shape.points), numbers, strict=True))
+        return Shape(tuple((new_positions[x], degree) for x, degree in shape.points))
     if isinstance(shape, Curve):
         return Curve(shape.kind, tuple(numbers), shape.height)
     if isinstance(shape, Linear):

@@ -84,9 +84,9 @@ def validate(
 def predicted_samples(log: Log, fit: Fit, vehicle: Vehicle, horizon: float) -> tuple[Array, Array, Array]:
     """Return times [s], (n,), measured and predicted velocities, (n, 3), of a run; horizon [s]."""
     parameters, values = with_mean_nuisances(fit.parameters, fit.values)
-    moved = move_back(log, _delays(parameters, values))
-    windows, _ = cut_windows([moved], vehicle, fit.step, horizon)
-    problem = Residuals([moved], vehicle, parameters, windows, fit.step, turns_measured=fit.turns_measured)
+    corrected_log = move_back(log, _delays(parameters, values))
+    windows, _ = cut_windows([corrected_log], vehicle, fit.step, horizon)
+    problem = Residuals([corrected_log], vehicle, parameters, windows, fit.step, turns_measured=fit.turns_measured)
     settings, parts = problem.settings(values), []
     for i, window in enumerate(problem.windows):
         topic = next(t for t in window.topics if t.name == "velocity")
@@ -256,10 +256,10 @@ def _scores(folds: Sequence[_Fold], vehicle: Vehicle, free: set[str], zero: set[
     scores = np.full(runs, np.nan)
     for fold in folds:
         values = fold.step_to([*free], [*zero])
-        found = validate(
+        predictions = validate(
             fold.test, vehicle, *with_mean_nuisances(fold.parameters, values), fold.step, _HORIZONS, (True,)
         )
-        by_horizon = [p.scores for p in found if p.topic in ("velocity", "position")]
+        by_horizon = [p.scores for p in predictions if p.topic in ("velocity", "position")]
         scores[[*fold.runs]] = np.mean(by_horizon, axis=0) if by_horizon else -np.inf
     return scores
 

@@ -69,16 +69,16 @@ def _quantities(columns: Sequence[str]) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the quantities that names of columns suggest, with their tables."""
     left = list(columns)
     for name, patterns, extra in _GUESSES:
-        found = [next((c for c in left if _matches(c, pattern)), "") for pattern in patterns]
-        if all(found) and len(set(found)) == len(found):
-            left = [c for c in left if c not in found]
-            match = _UNIT.search(found[0])
+        matches = [next((c for c in left if _matches(c, pattern)), "") for pattern in patterns]
+        if all(matches) and len(set(matches)) == len(matches):
+            left = [c for c in left if c not in matches]
+            match = _UNIT.search(matches[0])
             known = {"unit": match[1]} if match and match[1] in ("deg", "deg/s", "cm", "mm", "cm/s") else {}
-            yield name, {"columns": found} | extra | known
+            yield name, {"columns": matches} | extra | known
     for name, pattern in _THRUSTERS:
-        found = [c for c in left if re.fullmatch(pattern, c, re.IGNORECASE)]
-        if len(found) > 1:
-            yield name, {"columns": found}
+        matches = [c for c in left if re.fullmatch(pattern, c, re.IGNORECASE)]
+        if len(matches) > 1:
+            yield name, {"columns": matches}
 
 
 def _matches(column: str, pattern: str) -> bool:

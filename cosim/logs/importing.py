@@ -141,8 +141,8 @@ def import_log(
                 parts.append(LogContents(scratch / str(k)))
                 _read(path, own_map, parts[k], functools.partial(_report_part, report_progress, k, len(logs)))
                 if k:
-                    offset, found = clock_offset(parts[0], parts[k])
-                    parts[0].remarks.append(f"Clocks of {logs[0][0].name} and {path.name} are joined {found}.")
+                    offset, method = clock_offset(parts[0], parts[k])
+                    parts[0].remarks.append(f"Clocks of {logs[0][0].name} and {path.name} are joined {method}.")
                     parts[0].join(parts[k], offset)
             path = logs[0][0]
             _require_vehicle(parts[0], loaded)

@@ -34,8 +34,8 @@ def read_fmu_of(fmu: UserFmu) -> FmuFile:
     except PlantFmuError as error:
         raise ScenarioError(f"{fmu.key}.file: {error}") from error
     if "CS" not in file.libraries:
-        found = "has no binary for this machine" if "CS" in file.interfaces else "offers no co-simulation"
-        raise ScenarioError(f"{fmu.key}.file: {file.path.name} {found} ({NATIVE[-1]}), expected a co-simulation FMU")
+        reason = "has no binary for this machine" if "CS" in file.interfaces else "offers no co-simulation"
+        raise ScenarioError(f"{fmu.key}.file: {file.path.name} {reason} ({NATIVE[-1]}), expected a co-simulation FMU")
     return file
 
 

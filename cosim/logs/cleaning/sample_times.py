@@ -18,7 +18,7 @@ _WINDOWS = (10, 100)  # samples, bounds of the windows over which the rate is co
 _EVEN, _EVEN_RATE = 0.8, 0.5  # fraction of windows whose rate differs by at most this fraction: the sampling is even
 _ON_LINE, _UNEVEN = 0.9, 0.3  # minimum fraction of steps that differ from the period by at most this fraction of it
 _LONGEST_STALL = 5.0  # s, longest delay of a burst
-_MOVED = 0.1  # periods; a sample that moves by less is not counted
+_MIN_SHIFT = 0.1  # periods; a sample that moves by less is not counted
 _HELD = 1.0 / 3.0  # minimum fraction of repeats, from which on they are no samples of their own
 _LONGEST_HOLD = 0.95  # quantile of the lengths of holds, beyond which a value is taken as sampled again
 
@@ -43,8 +43,8 @@ def put_in_order(times: Array) -> tuple[Index, Array, int]:
     """Return an order of samples, their times [s], and the number of samples that bursts had delayed."""
     order: Index = np.argsort(times, kind="stable")
     if _is_bursting(times[order]) and (line := _even_times(times)) is not None:
-        moved = np.abs(line - times) > _MOVED * float(np.median(np.diff(line)))
-        return np.arange(len(times)), line, int(np.count_nonzero(moved))
+        is_shifted = np.abs(line - times) > _MIN_SHIFT * float(np.median(np.diff(line)))
+        return np.arange(len(times)), line, int(np.count_nonzero(is_shifted))
     return order, times[order], 0
 
 
