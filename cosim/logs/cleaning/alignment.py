@@ -16,6 +16,8 @@ from cosim.simulation.signals import Array
 _PERIOD = 0.02  # s, of signals that are correlated
 _SMOOTH = 0.2  # s
 _MIN_CORRELATION = 0.5
+_MAX_ELSEWHERE = 1.0 / 1.5  # of the peak, maximum correlation at offsets that are more than `_PEAK_WIDTH` away
+_PEAK_WIDTH = 2.0  # s
 _MIN_OVERLAP = 5.0  # s
 _ABSOLUTE = 1e8  # s, from which on times are those of a calendar
 _MAX_SIGNAL = 36_000.0  # s
@@ -45,8 +47,13 @@ def clock_offset(first: LogContents, other: LogContents) -> tuple[float, str]:
     overlap = min(end for _, end in spans) - max(start for start, _ in spans)
     shortest = min(end - start for start, end in spans)
     overlaps = overlap > min(_MIN_OVERLAP, 0.5 * shortest)
+    lead = f"its times begin {spans[1][0] - spans[0][0]:+.2f} s from where those of the first log begin"
     if overlaps and max(spans[0][0], spans[1][0]) > _ABSOLUTE:
         return 0.0, f"by their times, which overlap for {overlap:.4g} s"
+    if min(spans[0][0], spans[1][0]) > _ABSOLUTE:
+        raise ImportLogError(
+            f"{lead}, and overlap for {max(0.0, overlap):.4g} s: expected logs of one run, with clocks that agree"
+        )
     best, offset, name = _MIN_CORRELATION, 0.0, ""
     signals = [_signals(contents) for contents in (first, other)]
     for what in signals[0].keys() & signals[1].keys():
@@ -57,8 +64,7 @@ def clock_offset(first: LogContents, other: LogContents) -> tuple[float, str]:
         return 0.0, f"by their times, which overlap for {overlap:.4g} s"
     if not name:
         raise ImportLogError(
-            f"its times ({spans[1][0]:.6g} to {spans[1][1]:.6g} s) are not those of the first log "
-            f"({spans[0][0]:.6g} to {spans[0][1]:.6g} s), and no signal of both correlates above {_MIN_CORRELATION:g}: "
+            f"{lead}, and no signal of both correlates above {_MIN_CORRELATION:g} at one offset alone: "
             "expected one clock, or depth, velocity or turn rates in both"
         )
     return offset, f"by the correlation of their {name} ({best:.2f}): {offset:+.2f} s"
@@ -98,18 +104,20 @@ def _signals(contents: LogContents) -> dict[str, tuple[float, Array]]:
 
 
 def _lag(first: tuple[float, Array], other: tuple[float, Array]) -> tuple[float, float]:
-    """Return the time [s] to add to the other signal's times, and the mean correlation there."""
+    """Return the time [s] to add to the other signal's times, and the mean correlation there; 0 if not unique."""
     total: Array | float = 0.0
-    least = round(_MIN_OVERLAP / _PERIOD)
+    min_overlap = round(_MIN_OVERLAP / _PERIOD)
     for x, y in zip(detrend(first[1], axis=0).T, detrend(other[1], axis=0).T, strict=False):
         ones = correlate(np.ones(len(x)), np.ones(len(y)), method="fft")
         energy = np.sqrt(np.maximum(
             correlate(x * x, np.ones(len(y)), method="fft") * correlate(np.ones(len(x)), y * y, method="fft"), 1e-12
         ))  # fmt: skip
         total = total + np.where(
-            ones > max(least, 0.5 * min(len(x), len(y))), correlate(x, y, method="fft") / energy, 0.0
+            ones > max(min_overlap, 0.5 * min(len(x), len(y))), correlate(x, y, method="fft") / energy, 0.0
         )
     mean = np.asarray(total) / min(first[1].shape[1], other[1].shape[1])
     peak = int(np.argmax(mean))
+    is_elsewhere = np.abs(np.arange(len(mean)) - peak) > _PEAK_WIDTH / _PERIOD
+    is_unique = np.max(mean, where=is_elsewhere, initial=0.0) <= _MAX_ELSEWHERE * mean[peak]
     shift = (peak - (len(other[1]) - 1)) * _PERIOD
-    return first[0] + shift - other[0], float(mean[peak])
+    return first[0] + shift - other[0], float(mean[peak]) if is_unique else 0.0

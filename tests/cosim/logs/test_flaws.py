@@ -3,11 +3,14 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 import cosim
 from cosim.command_line.cli import main
 from cosim.errors import ImportLogError
+from cosim.logs.cleaning.alignment import clock_offset
 from cosim.logs.cleaning.sample_times import drop_held, put_in_order
+from cosim.logs.spool import LogContents
 from cosim.results.log_facts import load_log_facts
 from tests.cosim.logs.conftest import has_remark
 
@@ -305,6 +308,22 @@ def test_logs_with_nothing_in_common_are_refused(tmp_path):
         'time = { column = "t" }\n[depth]\ncolumns = ["z"]\n[wrench]\ncolumns = ["X", "X", "X", "X", "X", "X"]\n'
     )
     logs = [tmp_path / "nav.csv", tmp_path / "tau.csv"]
-    with pytest.raises(ImportLogError, match=r"no signal of both correlates above 0\.5"):
+    with pytest.raises(
+        ImportLogError, match=r"begin \+1700000000\.00 s from .* no signal of both correlates above 0\.5"
+    ):
         cosim.import_log(logs, "bluerov2_heavy", tmp_path / "run", columns=tmp_path / "map.toml")
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(("start", "offset"), [(0.0, 1.7e9), (1.7e9, 3600.0)])
+@pytest.mark.parametrize("seed", range(10))
+def test_logs_of_two_dives_are_not_joined(tmp_path, start, offset, seed):
+    """Clocks without a common time, and two clocks of a calendar an hour apart; signals alike in kind alone."""
+    rng, t = np.random.default_rng(seed), np.arange(0.0, 60.0, 0.1)
+    logs = [LogContents(tmp_path), LogContents(tmp_path / "other")]
+    (tmp_path / "other").mkdir()
+    for log, begin in zip(logs, (start, start + offset), strict=True):
+        depth = np.cumsum(gaussian_filter1d(rng.standard_normal(t.size), 40.0))
+        log.source("depth", "z").put_many(begin + t, depth[:, None])
+    with pytest.raises(ImportLogError, match=rf"begin \+{offset:.2f} s from"):
+        clock_offset(*logs)
