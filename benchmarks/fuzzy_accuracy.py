@@ -155,7 +155,9 @@ class Reference:
         half = (ends - starts) / 2
         places = (starts + ends) / 2 + _NODES[:, None] * half
         heights = self.height(places.ravel()).reshape(places.shape) * _WEIGHTS[:, None]
-        heights[:, half < 1e-14 * self.width] = 0.0  # around a singleton, or a jump
+        heights[:, half < np.spacing(max(abs(self.low), abs(self.low + self.width)))] = (
+            0.0  # around a singleton, or a jump
+        )
         return heights.sum(axis=0) * half, (heights * (places - self.low)).sum(axis=0) * half
 
     def error(self, defuzzifier: str, value: float) -> float:
