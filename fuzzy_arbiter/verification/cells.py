@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fuzzy_arbiter.definition import Variable
-from fuzzy_arbiter.shapes import Array, Shape
+from fuzzy_arbiter.engines.panels import Indices, roots
+from fuzzy_arbiter.shapes import Array, Membership, Shape
 
 Ranks = NDArray[np.int32]  # there are up to twice as many levels as there are weights of rules
 Kind = Literal["gap", "below", "above"]
@@ -128,9 +129,18 @@ def _joined(
 
 
 def _positions(variable: Variable) -> Array:
-    """Return the positions between which each term is straight, or only rises or only falls."""
+    """Return the positions between which each term is straight, or only rises or only falls, and is 0 or above it."""
     low, high = variable.universe
-    return np.unique([low, *(x for t in variable.terms for x in t.membership.features((low, high))), high])
+    knots = np.unique([low, *(x for t in variable.terms for x in t.membership.features((low, high))), high])
+    positions = [knots]
+    for shape in (term.membership for term in variable.terms if not isinstance(term.membership, Shape)):
+
+        def is_positive(x: Array, _: Indices, shape: Membership = shape) -> Array:
+            return np.asarray(np.sign(shape.of_many(x)) - 0.5)
+
+        ends, _ = roots(is_positive, knots[:-1], knots[1:], 1e-15 * (high - low))  # where small degrees become 0
+        positions.append(ends[np.isfinite(ends)])
+    return np.unique(np.concatenate(positions))
 
 
 def _sides(positions: Array, function: Callable[[Array], Array]) -> tuple[Array, Array]:

@@ -9,7 +9,9 @@ from functools import partial
 
 import pytest
 
-from fuzzy_arbiter import Arbiter, Output, Rule, Shape, System, Term, Variable, falling, rising, trapezoid, triangle
+from fuzzy_arbiter import (
+    Arbiter, Output, Rule, Shape, System, Term, Variable, curve, falling, rising, trapezoid, triangle,
+)  # fmt: skip
 from fuzzy_arbiter.criteria import Criterion, prioritized
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.propositions import Is
@@ -101,6 +103,19 @@ def test_a_gap_is_a_fault_unless_there_is_a_default():
     v = verify(System((pair("a"),), (output("y", 0.5),), ("if a is on then y is high",)))
     assert (v.ok, v.complete, v.graded_complete) == (True, False, False)
     assert "output 'y': no rule fires where a is off; it has its default 0.5 there" in texts(v, "warning")
+
+
+def test_degrees_of_curves_that_are_too_small_for_a_float_are_gaps():
+    terms = {"low": curve("gaussian", 0.0, 0.015), "high": curve("gaussian", 1.0, 0.004)}
+    s = System(
+        (Variable("x", (0, 1), terms),), (output("y"),), ("if x is low then y is low", "if x is high then y is high")
+    )
+    v = verify_system(s)
+    assert not v.ok and "no rule fires where x = " in v.findings[0].text
+    assert math.isnan(Arbiter(s)([v.findings[0].place["x"]])["y"])
+    (gap,) = [text for text in texts(v, "warning") if "no term has a degree above 0" in text]
+    low, high = map(float, re.findall(r"0\.\d+", gap))
+    assert (math.exp(-0.5 * (low / 0.015) ** 2) < 1e-300) and (math.exp(-0.5 * ((1.0 - high) / 0.004) ** 2) < 1e-300)
 
 
 @pytest.mark.parametrize("defuzzifier", ["centroid", "bisector", "mom", "average"])
