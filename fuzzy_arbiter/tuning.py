@@ -153,13 +153,13 @@ def fit(
             off = Arbiter(_with(system, numbers_at(x))).batch(rows) - wanted
         except ArbiterError:  # terms that no engine evaluates
             off = np.full(wanted.shape, np.nan)
-        return np.asarray((np.where(np.isnan(off), unknown, off) * factors[:, None]).ravel())
+        return np.asarray(np.where(np.isnan(off), unknown, off * factors[:, None]).ravel())
 
     before = arbiter.batch(rows) - wanted
     for row, k in np.argwhere(np.isnan(before)):
         raise InputError(f"row {row}: no rule fires for the output {system.outputs[k].name!r}, expected a default")
-    unknown = 10.0 * float(np.abs(before).max(initial=1e-300))
     cost = 0.5 * float(((before * factors[:, None]) ** 2).sum())
+    unknown = 10.0 * np.sqrt(2.0 * cost) + 1e-300  # above all errors before together, so that no step is taken there
     start = np.ones(len(names))  # not 0, about which SciPy's steps would not be relative
     bounds = 1.0 + (low - values) / scale, 1.0 + (high - values) / scale
     result = least_squares(errors, start, bounds=bounds, x_scale="jac", diff_step=_STEP, max_nfev=_MAX_ROUNDS)
@@ -269,9 +269,9 @@ def _in_order(system: System, numbers: dict[str, float], changed: Mapping[str, f
         else:
             chains = [names] if isinstance(term.shape, Shape) else []
         for chain in chains:
-            for _ in range(2):  # from the last to the first, then back
+            forward = not chain or numbers[chain[0]] <= numbers[chain[-1]]
+            for rises in (not forward, forward):  # from the last to the first, then back
                 chain.reverse()
-                rises = numbers[chain[0]] <= numbers[chain[-1]] if chain else True
                 for name, other in itertools.pairwise(chain):
                     gap = min(_GAP * (variable.universe[1] - variable.universe[0]), abs(numbers[other] - numbers[name]))
                     if other in changed:

@@ -10,8 +10,19 @@ from functools import partial
 import pytest
 
 from fuzzy_arbiter import (
-    Arbiter, Output, Rule, Shape, System, Term, Variable, curve, falling, rising, trapezoid, triangle,
-)  # fmt: skip
+    Arbiter,
+    Output,
+    Rule,
+    Shape,
+    System,
+    Term,
+    Variable,
+    curve,
+    falling,
+    rising,
+    trapezoid,
+    triangle,
+)
 from fuzzy_arbiter.criteria import Criterion, prioritized
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.propositions import Is
