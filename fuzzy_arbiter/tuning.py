@@ -208,6 +208,8 @@ def _numbers_of(shape: Membership | Value, inputs: Sequence[str]) -> dict[str, f
     if isinstance(shape, Curve):
         return dict(zip(KINDS[shape.kind].parameters, shape.parameters, strict=True))
     if isinstance(shape, Linear):
+        if "constant" in inputs:
+            raise DefinitionError("an input is named 'constant', expected another name beside linear values")
         return {**dict(zip(inputs, shape.coefficients, strict=True)), "constant": shape.constant}
     return {"value": shape.value} if isinstance(shape, Constant) else {}
 

@@ -152,4 +152,20 @@ def test_undefined_outputs_and_missing_scipy_are_named():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "fit: SciPy is not installed, expected the extra fuzzy-arbiter[tune]\n"
-    assert auto_terms(3)
+
+
+def test_a_tuned_system_is_defined_wherever_it_was():
+    x = Variable("x", (0, 1), {"hi": triangle(0.2, 0.6, 1.0), "b": trapezoid(0.52, 0.53, 1, 1)})
+    y = Output("y", (0, 10), {"a": Constant(0.0), "b": Constant(10.0)}, defuzzifier="average")
+    s = System((x,), (y,), ("if x is hi then y is a", "if x is b then y is b"))
+    samples, wanted = [[0.55]] * 400 + [[0.5]], [10.0] * 400 + [0.0]
+    result = fit(s, samples, wanted, free="x.hi.x1")
+    off = Arbiter(result.system).batch(samples)[:, 0] - wanted
+    assert result.cost_after == pytest.approx(0.5 * (off**2).sum()) and result.cost_after < result.cost_before
+
+
+def test_an_input_with_the_name_of_a_number_is_refused():
+    x = Variable("constant", (0, 1), auto_terms(["low", "high"]))
+    y = Output("y", (0, 9), {"a": Linear((2.0,), 1.0)}, defuzzifier="average")
+    with pytest.raises(DefinitionError, match="an input is named 'constant', expected another name"):
+        fit(System((x,), (y,), ("if constant is low then y is a",)), [[0], [1]], [1, 3])
