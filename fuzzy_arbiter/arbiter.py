@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -74,7 +74,7 @@ class Arbiter:
                 raise DefinitionError("got a system and criteria, expected one of the two")
             system = criteria
         if not isinstance(system, System):
-            if not isinstance(system, Sequence):
+            if not isinstance(system, Iterable):
                 raise DefinitionError(f"system is {shown(system)}, expected a System")
             system = prioritized(system, form, weight, normalization, outside, points)
         elif (form, weight, normalization, outside, points) != _DEFAULTS:
@@ -292,7 +292,7 @@ def _with_defaults(system: System, default: float | str | Mapping[str, float | s
     for name, value in each.items():
         if name not in names:
             raise DefinitionError(f"default: no output {name!r}, expected one of {', '.join(names)}")
-        if value == "mid-range":
+        if isinstance(value, str) and value == "mid-range":
             each[name] = sum(system[name].universe) / 2.0
     return replace(system, outputs=tuple(replace(o, default=each.get(o.name, o.default)) for o in system.outputs))
 

@@ -116,6 +116,8 @@ def test_rules_are_a_table_also_for_notebooks():
     ]
     twice = replace(flat, rules=("if food is not poor and food is not good then tip is medium",))
     assert twice.rule_table()[0]["if"] == "food is not poor and food is not good"
+    chained = replace(flat, rules=(*flat.rules, "if tip is high then tip is low"))
+    assert chained.rule_table()[-1]["if"] == "tip is high"
     html = replace(
         flat, inputs=(replace(SERVICE, terms={"a<b": rising(0, 1), "poor": falling(0, 10)}), FOOD)
     )._repr_html_()

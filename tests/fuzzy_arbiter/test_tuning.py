@@ -167,5 +167,5 @@ def test_a_tuned_system_is_defined_wherever_it_was():
 def test_an_input_with_the_name_of_a_number_is_refused():
     x = Variable("constant", (0, 1), auto_terms(["low", "high"]))
     y = Output("y", (0, 9), {"a": Linear((2.0,), 1.0)}, defuzzifier="average")
-    with pytest.raises(DefinitionError, match="an input is named 'constant', expected another name"):
+    with pytest.raises(ArbiterError, match="an input is named 'constant', expected another name"):
         fit(System((x,), (y,), ("if constant is low then y is a",)), [[0], [1]], [1, 3])
