@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-_QUARTER = 1.5707963267948966  # pi / 2
+QUARTER_TURN = 1.5707963267948966  # pi / 2
 # pi / 2 and ln 2 as sums: whole multiples of the first number of each are exact
 _SHORT_QUARTER, _REST_OF_QUARTER = 1.57079632673412561417, 6.07710050650619224932e-11
 _LN_2, _REST_OF_LN_2 = 0.693147180369123816490, 1.90821492927058770002e-10
@@ -37,7 +37,7 @@ def nearest_integer(x: float) -> int:
 
 def cosine(x: float) -> float:
     """Return cos x, within 2e-16, of an angle below 1e6 [rad]: Taylor's series of the rest after quarter turns."""
-    turns = nearest_integer(x / _QUARTER)
+    turns = nearest_integer(x / QUARTER_TURN)
     r = (x - turns * _SHORT_QUARTER) - turns * _REST_OF_QUARTER
     s, cos_r, sin_r = r * r, 1.0, 1.0
     for k in range(9, 0, -1):
@@ -51,7 +51,7 @@ def cosine(x: float) -> float:
 
 def sine(x: float) -> float:
     """Return sin x of an angle below 1e6 [rad], within 4e-16."""
-    return cosine(_QUARTER - x)
+    return cosine(QUARTER_TURN - x)
 
 
 def exponential(x: float) -> float:
@@ -83,7 +83,7 @@ def arctangent(y: float, x: float) -> float:
         series = 1.0 / n - s * series
     angle = _ARCTANGENTS[near] + rest * series
     if abs(y) > abs(x):
-        angle = _QUARTER - angle
+        angle = QUARTER_TURN - angle
     if x < 0.0:
-        angle = 2.0 * _QUARTER - angle
+        angle = 2.0 * QUARTER_TURN - angle
     return -angle if y < 0.0 else angle

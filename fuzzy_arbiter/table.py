@@ -20,10 +20,8 @@ def rule_rows(system: System) -> list[dict[str, str]]:
     """Return the words of each rule by column, as `System.rule_table` describes them."""
     # a condition on an output, or a variable with the name of a column, needs the rule's words
     names = {v.name for v in system.inputs}
-    by_input = [
-        words if (words := rule.condition.by_variable()) and names >= set(words) else None for rule in system.rules
-    ]
-    is_split = None not in by_input and not names & {"rule", "with"}
+    by_input = [rule.condition.by_variable() for rule in system.rules]
+    is_split = all(words and names >= set(words) for words in by_input) and not names & {"rule", "with"}
     weighted = any(rule.weight != 1.0 for rule in system.rules)
     rows = []
     for i, (rule, words) in enumerate(zip(system.rules, by_input, strict=True), 1):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller.arithmetic import arctangent, cosine, hypotenuse, square
+from controller.arithmetic import QUARTER_TURN, arctangent, cosine, hypotenuse, square
 from controller.compiling.function import CompiledFunction
 from controller.law import VehicleState
 from controller.navigation.corrections import CONFIRMED, correct_by_sensor, restart
@@ -45,7 +45,6 @@ _FIX_DEVIATIONS, _FIX_DISTANCE = 6.0, 0.5  # number of standard deviations, plus
 _MAX_GAP = 1.0  # s between two IMU samples, beyond which the filter starts again
 _FAR = 3.0  # m, standard deviation of a coordinate beyond which it counts as unknown
 _FAST = 0.5  # m/s, standard deviation of a velocity beyond which it counts as unknown
-_QUARTER_TURN = 1.5707963267948966  # rad
 
 
 def navigate(measurements: Measurements, sensors: SensorModel, memory: NavigationMemory, state: VehicleState) -> None:
@@ -109,9 +108,9 @@ def _start(measurements: Measurements, sensors: SensorModel, memory: NavigationM
 
 def _from_euler(roll: float, pitch: float, yaw: float) -> Vector4:
     """Return the quaternion of Euler angles (zyx) [rad]."""
-    cr, sr = cosine(0.5 * roll), cosine(0.5 * roll - _QUARTER_TURN)
-    cp, sp = cosine(0.5 * pitch), cosine(0.5 * pitch - _QUARTER_TURN)
-    cy, sy = cosine(0.5 * yaw), cosine(0.5 * yaw - _QUARTER_TURN)
+    cr, sr = cosine(0.5 * roll), cosine(0.5 * roll - QUARTER_TURN)
+    cp, sp = cosine(0.5 * pitch), cosine(0.5 * pitch - QUARTER_TURN)
+    cy, sy = cosine(0.5 * yaw), cosine(0.5 * yaw - QUARTER_TURN)
     return array(
         cr * cp * cy + sr * sp * sy,
         sr * cp * cy - cr * sp * sy,

@@ -10,10 +10,12 @@ from scipy.optimize import linprog
 from controller import LAWS, LawError
 from controller.allocation import Allocation
 from controller.driven_axes import AXES, left_axes, undriven_axes
+from controller.laws.deployable.braking import UNLIMITED, greatest_speed
 from controller.laws.deployable.model import make_thrusters, reallocate
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu import load_vehicle
 
+HEAVY = load_vehicle("bluerov2_heavy")
 ROV = load_vehicle("bluerov2")
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 WEAK = 0.01  # force or moment, as a fraction of a thruster's, below which an axis is not driven
@@ -119,3 +121,8 @@ def test_vehicle_that_does_not_right_itself_is_refused():
     law, vehicle = LAWS["deployable"], dataclasses.replace(ROV, r_B=-ROV.r_B)
     with pytest.raises(LawError, match=r"does not drive pitch both ways, and the righting moment is -11.2 N m"):
         law.for_vehicle(vehicle_model(vehicle), law.gains_type(), LEVEL, 0.02, 0)
+
+
+def test_a_righting_moment_does_not_bound_the_speed_of_driven_axes():
+    assert greatest_speed(vehicle_model(HEAVY)._replace(righting_moment=5.0), 0.35) == UNLIMITED
+    assert 0.3 < greatest_speed(vehicle_model(ROV), 0.35) < 1.5

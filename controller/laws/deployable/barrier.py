@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.arithmetic import exponential, sine, square
+from controller.arithmetic import QUARTER_TURN, exponential, sine, square
 from controller.laws.deployable.attitude import integrate_attitude
 from controller.laws.deployable.attraction import approach_speed
 from controller.laws.deployable.faces import FACES, face_ahead, has_faces
@@ -259,7 +259,7 @@ def write_tilt_rows(
         n[axis] = sign * down[2]
         rate = n[axis] * omega[axis - 3] - sign * down[1 - i] * omega[2]
         curve = sign * (turning[2] * omega[axis - 3] - turning[1 - i] * omega[2])
-        h = sine(gains.tilt) - abs(down[i])
+        h = sine(min(gains.tilt, QUARTER_TURN)) - abs(down[i])
         allowed = approach_speed(h, gains.turning_deceleration, gains.barrier_slope)
         slope = gains.barrier_slope
         if h > 0.0:

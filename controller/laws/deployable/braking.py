@@ -49,7 +49,7 @@ def greatest_speed(vehicle: VehicleModel, tilt: float) -> float:
     B, A = vehicle.thruster_matrix, np.diag(vehicle.added_mass)
     works = ~np.eye(B.shape[1] + 1, B.shape[1], dtype=bool)
     left = left_axes(B, vehicle.thrust_min * works, vehicle.thrust_max * works)
-    difference = max(abs(A[PITCH - axis] - A[2]) for axes in left for axis in axes or [])
+    difference = max((abs(A[PITCH - axis] - A[2]) for axes in left for axis in axes or []), default=0.0)
     return float(np.sqrt(2.0 * _tilting_moment(vehicle, tilt) / difference)) if difference > 0.0 else UNLIMITED
 
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from controller import quadratic_program
-from controller.arithmetic import sine, square
+from controller.arithmetic import QUARTER_TURN, sine, square
 from controller.law import (
     Array,
     CompiledLaw,
@@ -228,7 +228,7 @@ def _limit_speed(
         max_speed = min(max_speed, gains.speed * max(2.0 - spread / _TRUSTED_SPREAD, 0.0))
     for axis in range(3, 5):
         if metric[axis] == 0.0:
-            tilt = abs(down[4 - axis]) / sine(gains.tilt)
+            tilt = abs(down[4 - axis]) / sine(min(gains.tilt, QUARTER_TURN))
             max_speed = min(max_speed, gains.speed * max(2.0 - 2.0 * tilt, 0.0))
     speed = norm(desired)
     if speed > max_speed:

@@ -204,3 +204,14 @@ def test_position_uncertainty_reduces_speed():
         deployable_law._limit_speed(seen, 3.0 * spread, np.ones(6), np.array([0.0, 0.0, 1.0]), GAINS, desired)
         speeds.append(desired[0])
     assert speeds == pytest.approx([GAINS.speed, GAINS.speed, 0.5 * GAINS.speed, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("tilt", "fraction"), [(0.1, 0.2533), (0.35, 1.0), (1.6, 1.0), (3.0, 1.0), (np.pi, 1.0), (3.2, 1.0)]
+)
+def test_tilt_of_an_undriven_axis_reduces_speed(tilt, fraction):
+    seen, desired = law_for([]).memory.state_estimate, np.array([GAINS.speed, 0.0, 0.0])
+    seen.time_since_measurement = 0.0
+    metric, down = np.array([1.0, 1.0, 1.0, 1.0, 0.0, 1.0]), np.array([np.sin(0.0873), 0.0, np.cos(0.0873)])
+    deployable_law._limit_speed(seen, 0.0, metric, down, GAINS._replace(tilt=tilt), desired)
+    assert desired[0] == pytest.approx(fraction * GAINS.speed, rel=0.01)
