@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from controller.driven_axes import left_axes
+from controller.driven_axes import passive_axes
 from controller.errors import LawError
 from controller.stack_array import Array, Vector6
 
@@ -83,7 +83,7 @@ class Allocation:
         alive = (lower != 0.0) | (upper != 0.0)
         working = np.where(alive, matrix, 0.0)
         if rights:
-            working[left_axes(matrix, lower[None], upper[None])[0] or []] = 0.0
+            working[passive_axes(matrix, lower[None], upper[None])[0] or []] = 0.0
         inverse = np.ascontiguousarray(np.linalg.pinv(working))
         self.arguments = inverse, np.array(lower, dtype=float), np.array(upper, dtype=float), limits == "direction"
 

@@ -1,4 +1,4 @@
-"""Axes that thrusters drive, and those that are left to the righting moment."""
+"""Axes that thrusters drive, and passive ones, which the righting moment holds."""
 
 from __future__ import annotations
 
@@ -12,64 +12,68 @@ Array = NDArray[np.float64]
 
 AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 ROLL, PITCH, YAW = 3, 4, 5
-_LEFT: tuple[list[int], ...] = ([], [PITCH], [ROLL], [ROLL, PITCH])  # what may be left, the fewest axes first
-_WEAK, _NOTHING = 1e-2, 1e-6  # force or moment that is too weak, and 0, as a fraction of the greatest of a thruster
-_WAYS: Array = np.repeat(np.eye(3), 2, axis=0) * np.array([[1.0], [-1.0]] * 3)  # both ways along each of three axes
+_PASSIVE_SETS: tuple[list[int], ...] = ([], [PITCH], [ROLL], [ROLL, PITCH])  # fewest axes first
+_WEAK, _ZERO = 1e-2, 1e-6  # force or moment that is too weak, and 0, as a fraction of the greatest of a thruster
+_SIGNED_AXES: Array = np.repeat(np.eye(3), 2, axis=0) * np.array([[1.0], [-1.0]] * 3)  # each of three axes both ways
 
 
-def driven_both_ways(matrix: Array, lower: Array, upper: Array, left: list[int], least: float) -> NDArray[np.bool_]:
-    """Return True for each axis that is left, or driven both ways without any other; limits (k, m), returns (k, 6)."""
+def driven_both_ways(
+    matrix: Array, lower: Array, upper: Array, passive: list[int], min_fraction: float
+) -> NDArray[np.bool_]:
+    """Return a mask (k, 6) of the axes that are passive, or driven both ways without any other; limits (k, m)."""
     # A force, or a moment, is compared with the greatest one of a thruster.
     B = matrix.copy()
-    B[left] = 0.0
-    ends = np.concatenate([max_forces(rows, lower, upper, _WAYS) for rows in (B, np.roll(B, 3, axis=0))], axis=-1)
+    B[passive] = 0.0
+    parts = (B, np.roll(B, 3, axis=0))
+    ends = np.concatenate([max_forces(rows, lower, upper, _SIGNED_AXES) for rows in parts], axis=-1)
     limit = np.abs([lower, upper]).max()
     sizes = limit * np.repeat([np.linalg.norm(part, axis=0).max() for part in (matrix[:3], matrix[3:])], 3)
-    driven: NDArray[np.bool_] = np.nan_to_num(ends).reshape(*lower.shape[:-1], 6, 2).min(axis=-1) > least * sizes
-    driven[..., left] = True
+    weakest = np.nan_to_num(ends).reshape(*lower.shape[:-1], 6, 2).min(axis=-1)
+    driven: NDArray[np.bool_] = weakest > min_fraction * sizes
+    driven[..., passive] = True
     return driven
 
 
-def left_axes(matrix: Array, lower: Array, upper: Array) -> list[list[int] | None]:
-    """Return the axes to leave to the righting moment for each row of limits (k, m); None: that is not enough."""
+def passive_axes(matrix: Array, lower: Array, upper: Array) -> list[list[int] | None]:
+    """Return the passive axes for each row of limits (k, m); None: that is not enough."""
     result: list[list[int] | None] = [None] * len(lower)
-    for least in (_WEAK, _NOTHING):
-        for left in _LEFT:
+    for min_fraction in (_WEAK, _ZERO):
+        for passive in _PASSIVE_SETS:
             if None not in result:
                 break
-            enough = [bool(driven.all()) for driven in driven_both_ways(matrix, lower, upper, left, least)]
-            result = [left if axes is None and ok else axes for axes, ok in zip(result, enough, strict=True)]
+            enough = [bool(driven.all()) for driven in driven_both_ways(matrix, lower, upper, passive, min_fraction)]
+            result = [passive if axes is None and ok else axes for axes, ok in zip(result, enough, strict=True)]
     return result
 
 
 def require_driven(matrix: Array, lower: Array, upper: Array, righting_moment: float) -> list[int]:
-    """Return the axes left to the righting moment [N m]; raise `LawError` if there are others, or none of it."""
-    left = undriven_axes(matrix, lower, upper)
-    if not {ROLL, PITCH} >= set(left):
+    """Return the passive axes; raise `LawError` for other undriven ones, or without a righting moment [N m]."""
+    passive = undriven_axes(matrix, lower, upper)
+    if not {ROLL, PITCH} >= set(passive):
         raise LawError(
-            f"thrusters.matrix with its limits does not drive {join_axes(left)} both ways, expected all axes but "
+            f"thrusters.matrix with its limits does not drive {join_axes(passive)} both ways, expected all axes but "
             "roll and pitch, which the righting moment may hold"
         )
-    if left and not righting_moment > 0.0:
+    if passive and not righting_moment > 0.0:
         raise LawError(
-            f"thrusters.matrix does not drive {join_axes(left)} both ways, and the righting moment is "
+            f"thrusters.matrix does not drive {join_axes(passive)} both ways, and the righting moment is "
             f"{righting_moment:.3g} N m, expected more than 0: the center of buoyancy above the center of gravity"
         )
-    return left
+    return passive
 
 
 def undriven_axes(matrix: Array, lower: Array, upper: Array) -> list[int]:
-    """Return the axes that thrusters do not drive: those to leave, or if that is not enough, the others."""
-    (left,) = left_axes(matrix, lower[None], upper[None])
-    if left is None:
-        return np.flatnonzero(~driven_both_ways(matrix, lower[None], upper[None], _LEFT[-1], _NOTHING)[0]).tolist()
-    return left
+    """Return the axes that thrusters do not drive: the passive ones, or if that is not enough, the others."""
+    (passive,) = passive_axes(matrix, lower[None], upper[None])
+    if passive is None:
+        return np.flatnonzero(~driven_both_ways(matrix, lower[None], upper[None], _PASSIVE_SETS[-1], _ZERO)[0]).tolist()
+    return passive
 
 
 def add_righting(matrix: Array, lower: Array, upper: Array, moment: float) -> tuple[Array, Array, Array]:
-    """Return matrix and limits (k, m) with a moment [N m] of righting as two further thrusters, where axes are left."""
-    left = left_axes(matrix, lower, upper)
-    rights = moment * np.array([[axis in (axes or []) for axis in (ROLL, PITCH)] for axes in left])
+    """Return matrix and limits (k, m) with the righting moment [N m] as a further thruster for each passive axis."""
+    passive = passive_axes(matrix, lower, upper)
+    rights = moment * np.array([[axis in (axes or []) for axis in (ROLL, PITCH)] for axes in passive])
     return np.hstack([matrix, np.eye(6)[:, ROLL:YAW]]), np.hstack([lower, -rights]), np.hstack([upper, rights])
 
 

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from controller import paper_law
 from controller.driven_axes import PITCH, ROLL, join_axes, undriven_axes
 from controller.force_limits import max_forces
-from controller.laws.deployable.braking import greatest_speed
+from controller.laws.deployable.braking import max_upright_speed
 from controller.paper_law import primary_error, secondary_error
 from controller.quaternion import error, rotation_matrix
 from controller.regions.region_set import evaluate_at_pose
@@ -65,7 +65,7 @@ def _undriven_finding(scenario: Scenario, vehicle: Vehicle) -> Iterator[Finding]
     speed = ""
     if scenario.law.name == "deployable":
         tilt_limit = scenario.law.gains.tilt
-        limit = greatest_speed(vehicle_model(scenario.vehicle), tilt_limit)
+        limit = max_upright_speed(vehicle_model(scenario.vehicle), tilt_limit)
         speed = f" The law keeps below {math.degrees(tilt_limit):.0f}°, at up to {limit:.2g} m/s through the water."
     holds = righting > 0.0 and {ROLL, PITCH} >= set(left)
     advice = "Put the center of buoyancy (plant.parameters.r_B.z) above the center of gravity, or add thrusters."

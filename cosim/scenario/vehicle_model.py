@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller.driven_axes import left_axes
+from controller.driven_axes import passive_axes
 from controller.law import VehicleModel
 from plant_fmu.vehicle import Vehicle
 
@@ -26,7 +26,7 @@ def vehicle_model(vehicle: Vehicle) -> VehicleModel:
         thrust_time_constant=np.array(vehicle.thrust_time_constant, dtype=float),
     )
     works = ~np.eye(vehicle.n_thrusters + 1, vehicle.n_thrusters, dtype=bool)
-    left = left_axes(model.thruster_matrix, model.thrust_min * works, model.thrust_max * works)
+    left = passive_axes(model.thruster_matrix, model.thrust_min * works, model.thrust_max * works)
     if all(axes == [] for axes in left):
         return model
     return model._replace(righting_moment=vehicle.righting_moment)

@@ -9,8 +9,8 @@ from scipy.optimize import linprog
 
 from controller import LAWS, LawError
 from controller.allocation import Allocation
-from controller.driven_axes import AXES, left_axes, undriven_axes
-from controller.laws.deployable.braking import UNLIMITED, greatest_speed
+from controller.driven_axes import AXES, passive_axes, undriven_axes
+from controller.laws.deployable.braking import UNLIMITED, max_upright_speed
 from controller.laws.deployable.model import make_thrusters, reallocate
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu import load_vehicle
@@ -60,7 +60,7 @@ def is_driven(vehicle, left, least):
 def test_random_layout_is_driven_or_refused_by_its_axes(seed):
     vehicle = layout(seed)
     B, limits = vehicle.thruster_matrix, (vehicle.thrust_min, vehicle.thrust_max)
-    (left,) = left_axes(B, *(limit[None] for limit in limits))
+    (left,) = passive_axes(B, *(limit[None] for limit in limits))
     choices = itertools.product((WEAK, 1e-6), ([], [4], [3], [3, 4]))
     expected = next((axes for least, axes in choices if is_driven(vehicle, axes, least)), None)
     assert left == expected
@@ -124,5 +124,5 @@ def test_vehicle_that_does_not_right_itself_is_refused():
 
 
 def test_a_righting_moment_does_not_bound_the_speed_of_driven_axes():
-    assert greatest_speed(vehicle_model(HEAVY)._replace(righting_moment=5.0), 0.35) == UNLIMITED
-    assert 0.3 < greatest_speed(vehicle_model(ROV), 0.35) < 1.5
+    assert max_upright_speed(vehicle_model(HEAVY)._replace(righting_moment=5.0), 0.35) == UNLIMITED
+    assert 0.3 < max_upright_speed(vehicle_model(ROV), 0.35) < 1.5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.driven_axes import PITCH, add_righting, left_axes, require_driven
+from controller.driven_axes import PITCH, add_righting, passive_axes, require_driven
 from controller.errors import LawError
 from controller.force_limits import DIRECTIONS, max_forces
 from controller.law import VehicleModel
@@ -14,10 +14,10 @@ Array = NDArray[np.float64]
 
 UNLIMITED = 1e3  # m/s, a speed that no vehicle reaches
 _NEGLIGIBLE = 1e-6  # force that counts as zero, as a fraction of the greatest limit
-_SHARE = 0.5  # fraction of the righting moment at the greatest tilt for thrusters, and for Munk's moment
+_FRACTION = 0.5  # fraction of the righting moment at the greatest tilt for thrusters, and for Munk's moment
 
 
-def least_forces(vehicle: VehicleModel, tilt: float) -> Array:
+def min_forces(vehicle: VehicleModel, tilt: float) -> Array:
     """Return the maximum force in the worst direction, with each thruster lost and with none, (m + 1,) [N]."""
     # Without any moment, but for axes that are left to the righting moment: there up to what tilts the vehicle by
     # `tilt` [rad]. Over the 26 directions to faces, edges and corners of a cube in body axes: for the shipped vehicles
@@ -40,7 +40,7 @@ def least_forces(vehicle: VehicleModel, tilt: float) -> Array:
     return result
 
 
-def greatest_speed(vehicle: VehicleModel, tilt: float) -> float:
+def max_upright_speed(vehicle: VehicleModel, tilt: float) -> float:
     """Return the maximum speed [m/s] through water at which a vehicle that rights itself stays within `tilt` [rad]."""
     # Munk's moment about pitch is (Z_w' - X_u') u w of the added masses, at most half their difference times the
     # squared speed; so is it about roll with Y_v'. It counts for axes that are left, with any one thruster lost.
@@ -48,11 +48,11 @@ def greatest_speed(vehicle: VehicleModel, tilt: float) -> float:
         return UNLIMITED
     B, A = vehicle.thruster_matrix, np.diag(vehicle.added_mass)
     works = ~np.eye(B.shape[1] + 1, B.shape[1], dtype=bool)
-    left = left_axes(B, vehicle.thrust_min * works, vehicle.thrust_max * works)
+    left = passive_axes(B, vehicle.thrust_min * works, vehicle.thrust_max * works)
     difference = max((abs(A[PITCH - axis] - A[2]) for axes in left for axis in axes or []), default=0.0)
     return float(np.sqrt(2.0 * _tilting_moment(vehicle, tilt) / difference)) if difference > 0.0 else UNLIMITED
 
 
 def _tilting_moment(vehicle: VehicleModel, tilt: float) -> float:
     """Return the moment [N m] against the righting moment that each of thrusters and water may have."""
-    return float(_SHARE * np.sin(min(tilt, np.pi / 2.0)) * vehicle.righting_moment)
+    return float(_FRACTION * np.sin(min(tilt, np.pi / 2.0)) * vehicle.righting_moment)

@@ -39,7 +39,7 @@ from controller.laws.deployable.barrier import (
     write_rows,
     write_tilt_rows,
 )
-from controller.laws.deployable.braking import greatest_speed, least_forces
+from controller.laws.deployable.braking import max_upright_speed, min_forces
 from controller.laws.deployable.diagnostics import (
     DIAGNOSTICS,
     NO_BOUND,
@@ -290,7 +290,7 @@ class DeployableLaw(CompiledLaw):
             m=m,
             period=validate_period(period),
             report=Report.over(np.zeros(len(DIAGNOSTICS))),
-            dynamics=make_dynamics(vehicle, least_forces(vehicle, gains.tilt), greatest_speed(vehicle, gains.tilt)),
+            dynamics=make_dynamics(vehicle, min_forces(vehicle, gains.tilt), max_upright_speed(vehicle, gains.tilt)),
             thrusters=make_thrusters(vehicle),
             state_estimate=make_estimate(vehicle),
             attitude=empty_attitude(desired),

@@ -156,7 +156,7 @@ class Loads(NamedTuple):
 
 def free_wrench(dynamics: Dynamics, R: Matrix3, velocity: Vector3, omega: Vector3, loads: Loads) -> Vector6:
     """Return the wrench on the body without thrust [N, N m]: all of (11) but thrust and M nu_r'."""
-    # with velocity [m/s] in NED, omega [rad/s] in body axes
+    # Units of arguments: velocity [m/s] in NED, omega [rad/s] in body axes
     # It has drag against the water, weight and buoyancy, and the rate of the momentum M nu_r in the rotating body axes,
     # which in oblique motion includes Munk's moment.
     nu_r = np.concatenate((R.T @ (velocity - loads.water_velocity), omega))

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import linprog, minimize
 
 from controller import LawError
-from controller.laws.deployable.braking import least_forces
+from controller.laws.deployable.braking import min_forces
 from controller.laws.deployable.model import (
     Loads,
     free_acceleration,
@@ -78,7 +78,7 @@ def test_remaining_thrusters_realize_the_wrench_after_a_failure():
 def test_least_force_is_that_of_the_worst_direction():
     """Against a search over all directions for the greatest force that the limits allow without moment: within 2 %."""
     for model in MODELS.values():
-        forces = least_forces(model, 0.35)
+        forces = min_forces(model, 0.35)
         for lost in (2, 6, 8):
             limits = [(0.0, 0.0) if j == lost else (-u, u) for j, u in enumerate(model.thrust_max)]
 
@@ -103,12 +103,12 @@ def with_thrusters(model, keep):
 @pytest.mark.medium
 def test_vehicle_without_force_in_every_direction_is_rejected():
     with pytest.raises(LawError, match=r"does not drive roll both ways, and the righting moment is 0 N m"):
-        least_forces(with_thrusters(MODELS["bluerov2_heavy"], [0, 1, 2, 3, 4, 6]), 0.35)
+        min_forces(with_thrusters(MODELS["bluerov2_heavy"], [0, 1, 2, 3, 4, 6]), 0.35)
 
 
 def test_without_redundancy_least_force_after_a_loss_is_the_nominal_one():
     six = with_thrusters(MODELS["odin"], [0, 1, 2, 4, 5, 6])
-    forces = least_forces(
+    forces = min_forces(
         six._replace(
             thruster_matrix=np.vstack([np.eye(3), np.zeros((3, 3))]) @ np.eye(3, 6)
             + np.vstack([np.zeros((3, 6)), np.eye(3, 6, 3)])
@@ -137,7 +137,7 @@ def test_least_force_of_asymmetric_thrusters_is_that_of_the_weaker_direction():
         uneven.thrust_min[vertical], uneven.thrust_max[vertical] = low, high
         down = np.sort(uneven.thruster_matrix[2, vertical] * low)
         assert down.size == 4 and np.all(down == down[0])
-        assert least_forces(uneven, 0.35)[-1] == pytest.approx(20.0)
+        assert min_forces(uneven, 0.35)[-1] == pytest.approx(20.0)
 
 
 def test_stuck_thruster_has_equal_limits_at_its_force():
