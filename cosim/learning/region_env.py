@@ -27,7 +27,7 @@ from cosim.learning.control_period import (
     begin,
     call_each,
 )
-from cosim.scenario.law_factory import law_of
+from cosim.scenario.law_factory import law_of, require_builtin_law
 from cosim.scenario.scenario import Scenario, load_scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.bindings import BoundLaw, bind_rules
@@ -48,6 +48,7 @@ class _Setup:
     ) -> None:
         base = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
         require_fused(base, "learning")
+        require_builtin_law(base)
         self.variation = Variation(base, list(vary))
         self.low, self.high = np.array(list(vary.values()), dtype=float).reshape(-1, 2).T
         self.scale = greatest_wrench(base.vehicle)  # N, N m
@@ -232,6 +233,7 @@ class RegionVectorEnv(VectorEnv[Any, Any, Any]):
             if one is not None or self._random[i] is None:
                 self._random[i] = np.random.default_rng(one)
             self._begin(i)
+        self._ended[:] = False
         return self._seen.astype(np.float32), {}
 
     def step(self, actions: Array) -> tuple[Any, Any, Any, Any, dict[str, Any]]:

@@ -127,12 +127,16 @@ def test_an_episode_that_ended_begins_anew_in_the_next_step(make_vec):
     observation, rewards, *_ = ends[5]
     assert not rewards.any() and observation == pytest.approx(first, abs=0.1)
     assert ends[6][1].any()
+    assert [envs.step(np.ones((2, 6)))[3].all() for _ in range(4)][-1]
+    envs.reset(seed=0)  # begins those that ended, which fly in the next step
+    assert envs.step(np.ones((2, 6)))[1].any()
 
 
 @pytest.mark.parametrize(
     ("parameters", "error", "words"),
     [
         ({"scenario": "paper"}, RunError, "arbiter.engine is 'skfuzzy', expected 'closed' for learning"),
+        ({"scenario": "docking", "overrides": ["law.name=mine.py:steer"]}, RunError, "law.name is 'mine.py:steer'"),
         ({"vary": {"initial.psition.0": (0.0, 1.0)}}, ScenarioError, "initial.psition.0"),
         ({"overrides": ["time.x=1"]}, ScenarioError, "time.x"),
         ({"scenrio": "docking"}, TypeError, "scenrio"),
