@@ -110,10 +110,15 @@ def _name_law(table: dict[str, Any], name: object, file: object = "") -> None:
         law.pop("name", None)
         law.pop("gains", None)
         law.pop("digest", None)
-    elif isinstance(law, dict) and law.get("name", "ismail_dunnigan") != name:
+    elif isinstance(law, dict) and _present_name(law) != name:
         for key in ("gains", "file", "inputs", "outputs", "parameters", "digest"):
             law.pop(key, None)
         law["name"] = name
+
+
+def _present_name(law: dict[str, Any]) -> object:
+    """Return the name of a law: that of its FMU's file, which needs no key, or that of the key."""
+    return Path(str(law["file"])).name if law.get("file") else law.get("name", "ismail_dunnigan")
 
 
 def _name_rules(table: dict[str, Any]) -> None:

@@ -221,6 +221,23 @@ def test_commands_steer_beside_the_fmu(fmus):
                 assert (np.abs(master.row[master.signals.index("wrench.Z")]) > 0.0) == (k != 30)
 
 
+def test_forces_that_no_output_sets_are_zero(tmp_path):
+    """Also after a pilot commanded them."""
+    build_foreign_fmu(tmp_path / "z.fmu", 3, inputs={"velocity.w": 12}, outputs={"wrench.Z": 22})
+    scenario = load_scenario("paper", [*SHORT, f"law.file={tmp_path}/z.fmu", "commands.enabled=true"])
+    queue, forces = CommandQueue(), []
+    with Master(scenario) as master:
+        for k in range(30):
+            if k == 5:
+                queue.submit(cmd.SetMode("manual"))
+                queue.submit(cmd.ManualControl((0.5, 0, 0, 0, 0, 0)))
+            if k == 20:
+                queue.submit(cmd.SetMode("reach"))
+            master.step(k, queue)
+            forces.append(master.row[master.signals.index("wrench.X")])
+    assert forces[15] > 0.0 and forces[-1] == 0.0
+
+
 @pytest.mark.medium
 def test_controller_of_the_howto_flies(tmp_path, monkeypatch):
     """A controller made by pythonfmu, in the scenario of docs/howto/your-fmu.md."""
