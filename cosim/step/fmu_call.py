@@ -42,6 +42,7 @@ def call_law(fmu: FmuCalls, model: StepModel, data: StepData, forces: Array) -> 
         progress[FAILED] = -1.0
         data.failed_step = data.k
         return
+    forces[:] = 0.0  # those that no output sets, as a pilot may have set them
     for i in range(fmu.targets.size):
         target, value = fmu.targets[i], native.outputs[i]
         if target >= n:

@@ -208,6 +208,16 @@ def test_another_law_drops_the_map(fmus):
     assert back.law.name == "brake3.fmu" and back.table["law"]["gains"] == {}
 
 
+def test_default_law_replaces_an_fmu(fmus, tmp_path):
+    """By its name, in an override and in a scenario that has the other as its base."""
+    (tmp_path / "mine.toml").write_text(f'base = "paper"\nlaw = {{ file = "{(fmus / "brake3.fmu").as_posix()}" }}\n')
+    (tmp_path / "child.toml").write_text('base = "mine.toml"\nlaw = { name = "ismail_dunnigan" }\n')
+    changed = load_scenario(tmp_path / "mine.toml", ["law.name=ismail_dunnigan"])
+    for scenario in (changed, load_scenario(tmp_path / "child.toml")):
+        assert scenario.law.fmu is None and scenario.law.name == "ismail_dunnigan"
+    assert load_scenario(tmp_path / "mine.toml", ["law.name=brake3.fmu"]).law.fmu is not None
+
+
 def test_commands_steer_beside_the_fmu(fmus):
     """The FMU begins again where it regains control."""
     scenario = braked(fmus, 3, "commands.enabled=true", "commands.obstacles=0")
