@@ -79,8 +79,11 @@ class Fit:
 
     def residuals_by_topic(self) -> dict[str, Array]:
         """Return the residuals of each topic, shape (samples, components), in standard deviations of the noise."""
-        windows = [w.by_topic(r.residual) for w, r in zip(self.windows, self.residuals, strict=True)]
-        return {name: np.concatenate([rows[name] for rows in windows]) for name in windows[0]}
+        residuals: dict[str, list[Array]] = {}
+        for window, reduced in zip(self.windows, self.residuals, strict=True):
+            for name, rows in window.by_topic(reduced.residual).items():
+                residuals.setdefault(name, []).append(rows)
+        return {name: np.concatenate(rows) for name, rows in residuals.items()}
 
     def worst_topic(self) -> tuple[str, float]:
         """Return the topic with the greatest residuals, and their root mean square in standard deviations of noise."""

@@ -41,8 +41,8 @@ def figures_of(
     yield NamedFigure("whiteness", _WHITENESS, _whiteness(fit, vehicle))
     if predictions:
         yield NamedFigure("predictions", _PREDICTIONS, _predictions(predictions))
-    if shown is not None and shown.topic("velocity") is not None:
-        yield NamedFigure("course", _COURSE, velocity_course(shown, fit, vehicle))
+    if shown is not None and (course := velocity_course(shown, fit, vehicle)) is not None:
+        yield NamedFigure("course", _COURSE, course)
     yield NamedFigure("correlation", _CORRELATION, _correlation(fit))
 
 
@@ -100,11 +100,14 @@ def _residuals(fit: Fit) -> Figure:
 
 
 def _whiteness(fit: Fit, vehicle: Vehicle) -> Figure:
-    name = "velocity" if any(t.name == "velocity" for t in fit.windows[0].topics) else fit.windows[0].topics[0].name
+    names = [topic.name for window in fit.windows for topic in window.topics]
+    name = "velocity" if "velocity" in names else names[0]
     rows, inputs = list[Array](), list[Array]()
     for window, reduced in zip(fit.windows, fit.residuals, strict=True):
         log = fit.logs[window.run]
-        topic = next(t for t in window.topics if t.name == name)
+        topic = next((t for t in window.topics if t.name == name), None)
+        if topic is None:
+            continue
         forces = log.thrust @ vehicle.thruster_matrix.T + log.wrench
         times = topic.times + window.begin
         held = forces[np.clip(np.searchsorted(log.times, times, "right") - 1, 0, len(forces) - 1)]
@@ -147,9 +150,11 @@ def _predictions(predictions: Sequence[Prediction]) -> Figure:
     return figure
 
 
-def velocity_course(log: Log, fit: Fit, vehicle: Vehicle) -> Figure:
-    """Draw measured and predicted velocities of a run."""
+def velocity_course(log: Log, fit: Fit, vehicle: Vehicle) -> Figure | None:
+    """Draw measured and predicted velocities of a run; None if there are none."""
     times, measured, predicted = predicted_samples(log, fit, vehicle, _AHEAD)
+    if not len(times):
+        return None
     figure, panels = _panels(3, 1.2, sharex=True)
     breaks = np.flatnonzero(np.diff((times - times[0]) // _AHEAD)) + 1
     for axes, component, x, y in zip(panels, AXES["velocity"], measured.T, predicted.T, strict=True):

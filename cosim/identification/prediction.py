@@ -82,15 +82,19 @@ def validate(
 
 
 def predicted_samples(log: Log, fit: Fit, vehicle: Vehicle, horizon: float) -> tuple[Array, Array, Array]:
-    """Return times [s], (n,), measured and predicted velocities, (n, 3), of a run; horizon [s]."""
+    """Return times [s], (n,), measured and predicted velocities, (n, 3), where a run is predicted; horizon [s]."""
     parameters, values = with_mean_nuisances(fit.parameters, fit.values)
     corrected_log = move_back(log, _delays(parameters, values))
     windows, _ = cut_windows([corrected_log], vehicle, fit.step, horizon)
     problem = Residuals([corrected_log], vehicle, parameters, windows, fit.step, turns_measured=fit.turns_measured)
-    settings, parts = problem.settings(values), []
-    for i, window in enumerate(problem.windows):
+    settings = problem.settings(values)
+    parts = [(np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))]
+    for i, window in enumerate(problem.windows if log.topic("velocity") else ()):
         topic = next(t for t in window.topics if t.name == "velocity")
-        error = window.by_topic(problem.raw(i, settings, window.start, full=False)[0])["velocity"] * topic.noise
+        try:
+            error = window.by_topic(problem.raw(i, settings, window.start, full=False)[0])["velocity"] * topic.noise
+        except IdentificationError:
+            continue  # the prediction does not stay finite
         parts.append((topic.times + window.begin, topic.values, topic.values + error))
     times, measured, predicted = (np.concatenate(x) for x in zip(*parts, strict=True))
     return times, measured, predicted

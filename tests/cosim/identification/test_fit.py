@@ -11,6 +11,7 @@ from cosim.errors import IdentificationError
 from cosim.identification.delays import find_delays
 from cosim.identification.findings import require_distinguishable, slow_commands, warnings
 from cosim.identification.fit import Problem, fit, integration_step
+from cosim.identification.identification_figures import figures_of
 from cosim.identification.log import TOPICS, Log, make_topic
 from cosim.identification.parameters import DEFAULT_FREE, free_parameters, nuisances, with_mean_nuisances, with_values
 from cosim.identification.prediction import validate
@@ -117,6 +118,26 @@ def test_fitted_model_predicts_better_than_constant_velocity(log, vehicle, estim
     for p in validate([log], vehicle, estimate.parameters, estimate.values, estimate.step):
         if p.topic == "velocity":
             assert p.identified[0] < p.start_vehicle[0] and p.identified[0] < 0.5 * p.constant_velocity[0]
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize(("seconds", "damping"), [(SECONDS, 110.0), (0.5, 110.0), (SECONDS, -1e6)])
+def test_figures_are_drawn_of_runs_without_a_topic_or_a_prediction(log, vehicle, estimate, seconds, damping):
+    """A window of another run without velocity, a held-out run without a window, and one that diverges."""
+    mixed = dataclasses.replace(
+        estimate,
+        windows=(
+            dataclasses.replace(estimate.windows[0], topics=estimate.windows[0].topics[1:]),
+            *estimate.windows[1:],
+        ),
+        values=np.where(np.arange(len(estimate.values)) == 0, damping, estimate.values),
+    )
+    end = int(seconds / PERIOD)
+    shown = dataclasses.replace(log, times=log.times[:end], thrust=log.thrust[:end], wrench=log.wrench[:end])
+    is_predicted = seconds == SECONDS and damping > 0.0
+    names = [figure.name for figure in figures_of(mixed, vehicle, (), shown)]
+    assert names == ["numbers", "residuals", "whiteness", *(["course"] if is_predicted else []), "correlation"]
+    assert mixed.residuals_by_topic().keys() == estimate.residuals_by_topic().keys()
 
 
 @pytest.mark.slow
