@@ -234,6 +234,7 @@ class AutopilotSession:
             self._link.send(m.MAVLink_timesync_message(0, self.reported.sync.request(now)))
         is_up = math.isfinite(self.reported.age(now))  # one that starts does not answer parameter requests
         origin = self._options.global_origin
+        self._sent_at.setdefault("origin", now)  # the autopilot's own may arrive first
         if origin is not None and not self.reported.has_origin and self._is_due("origin", _ORIGIN_PERIOD, now):
             latitude, longitude = (round(1e7 * angle) for angle in origin)
             self._link.send(m.MAVLink_set_gps_global_origin_message(self.reported.system, latitude, longitude, 0))

@@ -69,7 +69,7 @@ class ReportedState:
         self.results: dict[int, int] = {}  # last MAV_RESULT of each command, by MAV_CMD number
         self.texts: list[str] = []
         self.sync = ClockSync()
-        self._position_boot = self.attitude_boot = math.nan
+        self._position_boot = self._global_boot = self.attitude_boot = math.nan
         self._position_at = self._attitude_at = -math.inf  # our time [s]
         self._second = False  # True if SCALED_PRESSURE2 is received: the sensor outside the hull
 
@@ -154,6 +154,10 @@ class ReportedState:
         self.resets = m.reset_counter
 
     def _receive_global_position_int(self, m: Any, now: float) -> None:
+        boot = m.time_boot_ms * _MILLI
+        if boot < self._global_boot:  # it has restarted, and may have lost its origin
+            self.global_position, self.has_origin = None, False
+        self._global_boot = boot
         if m.lat or m.lon or self._is_absolute:  # an ArduSub without a position sends zeros
             self.global_position, self.has_origin = (m.lat * 1e-7, m.lon * 1e-7, m.relative_alt * _MILLI), True
 

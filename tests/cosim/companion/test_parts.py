@@ -123,6 +123,20 @@ def test_zero_latitude_and_longitude_are_a_position_of_an_absolute_estimate():
     assert reported((0.0, 0.0, 0.0), (0.0, 0.0), state=state).global_position == (0.0, 0.0, 0.0)
 
 
+def test_an_origin_is_lost_when_the_autopilot_restarts():
+    state = reported((0.0, 0.0, 0.0))
+    for boot, place, has_origin in (
+        (90, 5, True),
+        (91, 5, True),
+        (1, 0, False),
+        (2, 0, False),
+        (3, 5, True),
+        (1, 5, True),
+    ):
+        state.receive(1, 1, message("GLOBAL_POSITION_INT", time_boot_ms=1000 * boot, lat=place, lon=place), 0.0)
+        assert state.has_origin == has_origin and (state.global_position is not None) == has_origin
+
+
 def test_depth_that_drifts_from_the_second_pressure_is_seen_in_a_surveyed_frame():
     """SCALED_PRESSURE2 may be the only pressure."""
     positions = [(0.0, 0.0, 2.0 + min(0.01 * k, 2.0)) for k in range(600)]
