@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import mmap
 import os
 import re
 import sqlite3
@@ -161,7 +162,8 @@ def _mcap_records(file: BinaryIO, size: int = 0) -> Iterator[tuple[int, bytes]]:
         opcode, length = _RECORD_HEAD.unpack(head) if len(head) == _RECORD_HEAD.size else (0, 0)
         limit = _MAX_RECORD.get(opcode)
         begin = file.tell() - len(head)
-        if size and begin + _RECORD_HEAD.size + length > size and (chunk := _next_chunk(file, begin + 1)) is not None:
+        is_damaged = begin + _RECORD_HEAD.size + length > size or (limit is not None and length > limit)
+        if size and is_damaged and (chunk := _next_chunk(file, begin + 1)) is not None:
             file.seek(chunk)
             yield _DAMAGED, b""
             continue
@@ -178,13 +180,11 @@ def _mcap_records(file: BinaryIO, size: int = 0) -> Iterator[tuple[int, bytes]]:
 
 def _next_chunk(file: BinaryIO, start: int) -> int | None:
     """Return the offset of the next compressed chunk from an offset on, or None."""
-    file.seek(start)
-    data = file.read()
-    for match in _CHUNK_HEAD.finditer(data):
-        begin = match.start() - _BEFORE_COMPRESSION
-        if begin >= 0 and data[begin] == _CHUNK:
-            return start + begin
-    file.seek(start - 1 + _RECORD_HEAD.size)
+    with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        for match in _CHUNK_HEAD.finditer(data, start):
+            begin = match.start() - _BEFORE_COMPRESSION
+            if begin >= start and data[begin] == _CHUNK:
+                return begin
     return None
 
 

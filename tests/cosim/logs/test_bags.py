@@ -3,8 +3,11 @@
 import contextlib
 import shutil
 import sqlite3
+import struct
 import sys
 import tomllib
+import tracemalloc
+from io import BytesIO
 
 import numpy as np
 import pytest
@@ -12,7 +15,7 @@ import tomli_w
 from scipy.spatial.transform import Rotation
 
 from cosim.command_line.cli import main
-from cosim.logs.bag_storage import stored_messages
+from cosim.logs.bag_storage import _mcap_records, stored_messages
 from cosim.logs.formats.bag import Decoder
 from cosim.results.log_facts import load_log_facts
 from tests.cosim.logs.conftest import LOGS, changed, has_remark
@@ -266,6 +269,31 @@ def test_damaged_mcap_is_read_before_and_after_the_damage(bag, columns, dive, tm
     assert run.summary["simulated_time"] > dive.times[-1] - 1.0
     samples = {t.quantity: t.samples for t in load_log_facts(run.folder).topics}
     assert samples["position"] > 0.8 * len(dive.times)
+
+
+def test_a_wrong_bit_in_the_head_of_a_chunk_costs_that_chunk(bag, columns, tmp_path, imported):
+    """Its length stays inside the file, and is too large for the record that it now seems to be."""
+    from mcap.reader import make_reader
+
+    data = bytearray(bag.read_bytes())
+    data[make_reader(BytesIO(data)).get_summary().chunk_indexes[1].chunk_start_offset] ^= 4
+    (tmp_path / "damaged.mcap").write_bytes(data)
+    assert has_remark(imported(tmp_path / "damaged.mcap", columns=columns), "1 damaged chunks of damaged.mcap")
+
+
+def test_damage_is_passed_over_without_loading_the_rest_of_a_file(tmp_path):
+    chunk = bytes(28) + b"\4\0\0\0zstd"
+    with (tmp_path / "large.mcap").open("wb+") as file:
+        file.write(b"\6" + b"\xff" * 8)
+        file.seek(1 << 26)
+        file.write(struct.pack("<BQ", 6, len(chunk)) + chunk)
+        size = file.tell()
+        file.seek(0)
+        tracemalloc.start()
+        assert [*_mcap_records(file, size)] == [(-1, b""), (6, chunk)]
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    assert peak < 1 << 20
 
 
 def test_topics_of_a_bag_without_a_map_are_drafted(bag, tmp_path, capsys):
