@@ -157,7 +157,7 @@ class Companion:
         self.session = AutopilotSession(link, self.scenario.vehicle, options)
         self._reported = ("", "")
         self.placement = ""
-        self._placed_by: tuple[Array | None, bool, bool] = (None, False, False)
+        self._placed_by: tuple[Array | None, bool, frozenset[int]] = (None, False, frozenset())
         self._scene = Placement(self.scenario)
         self.session.dive.clearance = self._clearance
 
@@ -289,15 +289,15 @@ class Companion:
             return
         position = session.alignment.to_scene(session.reported.position)
         if not np.isfinite(position).all():
-            session.is_placed, self._placed_by = False, (None, False, False)
+            session.is_placed, self._placed_by = False, (None, False, frozenset())
             return
         distance = self._scene.distance(position)
         is_near = distance <= MAX_DISTANCE
         quaternion = session.reported.quaternion
         contradictions = self._scene.contradictions(position, quaternion, session.reported.ranges)
-        placed_by = offset, is_near, bool(contradictions)
+        placed_by = offset, is_near, frozenset(contradictions)
         if self._placed_by[0] is not offset or self._placed_by[1:] != placed_by[1:]:
-            self.placement = "; WARNING: ".join([self._scene.describe(position, quaternion), *contradictions])
+            self.placement = "; WARNING: ".join([self._scene.describe(position, quaternion), *contradictions.values()])
             session.misplaced = "" if is_near else f"{format_distance(distance)} from everything in it"
             self.placement += f"; {session.misplaced}" if session.misplaced else ""
         self._placed_by = placed_by

@@ -18,6 +18,8 @@ _BEAMS = {  # words for, and body directions of, a distance sensor by its MAV_SE
     6: ("left", (0.0, -1.0, 0.0)), 24: ("above", (0.0, 0.0, -1.0)), 25: ("below", (0.0, 0.0, 1.0)),
 }  # fmt: skip
 _RANGE_TOLERANCE = 0.5  # m, by which a sensor's range may differ from the scene's
+_INSET = 0.6  # m, maximum distance of regions, which are for the vehicle's center, from what a sensor sees
+_MIN_STRIDE = 0.05  # m, along a beam
 _MAX_RANGE, _ROUNDING = 50.0, 1e-3  # m
 MAX_DISTANCE = 50.0  # m, horizontal distance from everything in the scene, beyond which nothing is steered
 
@@ -47,22 +49,25 @@ class Placement:
         """Return the minimum clearance of hard regions [m] at a pose; infinite if there are none."""
         return float(np.min(self._environment.evaluate(position, quaternion)[1][self.hard], initial=math.inf))
 
-    def contradictions(self, position: Array, quaternion: Array, ranges: Mapping[int, float]) -> list[str]:
-        """List ranges [m], by MAV_SENSOR_ROTATION, that differ from those to the hard regions of the scene."""
-        R, differing = rotation_matrix(quaternion), []
+    def contradictions(self, position: Array, quaternion: Array, ranges: Mapping[int, float]) -> dict[int, str]:
+        """Describe ranges [m], by MAV_SENSOR_ROTATION, that differ from those to the hard regions of the scene."""
+        R, differing = rotation_matrix(quaternion), dict[int, str]()
         for rotation in ranges.keys() & _BEAMS:
             (word, beam), measured = _BEAMS[rotation], ranges[rotation]
             expected = self._range(position, quaternion, R @ beam)
-            if abs(expected - measured) > _RANGE_TOLERANCE and expected < _MAX_RANGE:
-                differing.append(f"{word} {expected:.2f} m are free, but {measured:.2f} m by the distance sensor")
+            is_expected = -_RANGE_TOLERANCE <= measured - expected <= _RANGE_TOLERANCE + _INSET
+            if not is_expected and expected < _MAX_RANGE:
+                differing[rotation] = f"{word} {expected:.2f} m are free, but {measured:.2f} m by the distance sensor"
         return differing
 
     def _range(self, position: Array, quaternion: Array, direction: Array) -> float:
         """Return the distance [m] to the first hard region in a direction, a unit vector; at least 50 m for none."""
-        way = 0.0
-        while way < _MAX_RANGE and (free := self.clearance(position + way * direction, quaternion)) > _ROUNDING:
-            way += free
-        return way
+        distance, free = 0.0, math.inf
+        while (
+            distance < _MAX_RANGE and (free := self.clearance(position + distance * direction, quaternion)) > _ROUNDING
+        ):
+            distance += max(free, _MIN_STRIDE)
+        return max(0.0, distance + min(free, 0.0))  # not beyond the surface by part of a stride
 
     def describe(self, position: Array, quaternion: Array) -> str:
         """Describe a pose by its position [m, NED], and its distances to the goal and the nearest hard region."""
