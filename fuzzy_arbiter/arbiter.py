@@ -168,14 +168,17 @@ class Arbiter:
         return tuple.__new__(self._result, result.T) if by_name else result
 
     def centroids(self, inputs: Sample | None = None, /, *others: object, **named: float) -> Result[float]:
-        """Return the raw value of each output, before normalization; the arguments are those of a call.
+        """Return the raw value of each output, before normalization: the default, or NaN, where no rule fires.
 
-        Where no rule fires it is the default, or NaN.
+        `inputs`, or `named` ones, are those of a call; `others` are refused.
         """
         return tuple.__new__(self._result, self._engine.centroids(self._samples.one(_one_of(inputs, others, named))))
 
     def explain(self, inputs: Sample | None = None, /, *others: object, **named: float) -> Explanation:
-        """Explain the outputs for a sample, given as for a call: each rule's strength, and the rules that decided."""
+        """Explain the outputs for a sample: each rule's strength, and the rules that decided.
+
+        `inputs`, or `named` ones, are those of a call; `others` are refused.
+        """
         from fuzzy_arbiter.explanation import explain
 
         return explain(self._engine, self._samples.one(_one_of(inputs, others, named)))

@@ -171,13 +171,13 @@ class RegionEnv(gymnasium.Env[Any, Any]):
         self._flight = _Flight(self._setup, self._wrench, self._seen, self._outcome)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Begin an episode; return its first observation."""
+        """Begin an episode, drawn by `seed`; return its first observation and info; `options` are passed over."""
         super().reset(seed=seed)
         self._flight.begin(self.np_random)
         return self._observed(), self._flight.info()
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Hold a wrench for a control period; return observation, reward, terminated, truncated and info."""
+        """Hold the wrench `action`, in [-1, 1], for a control period; return observation, reward, ends and info."""
         self._wrench[:] = np.clip(action, -1.0, 1.0) * self._setup.scale
         return self._step(self._flight.period.call)
 
@@ -199,10 +199,9 @@ class RegionEnv(gymnasium.Env[Any, Any]):
 
 
 class RegionVectorEnv(VectorEnv[Any, Any, Any]):
-    """Several `RegionEnv` side by side in one process; ``gymnasium.make_vec("subreach/Region-v0", num_envs=16)``.
+    """Several `RegionEnv` side by side in one process; ``gymnasium.make_vec("subreach/Region-v0", num_envs=16)``."""
 
-    Parameters are those of `RegionEnv`. An episode that has ended begins anew in the next step, with a reward of 0.
-    """
+    # parameters are those of `RegionEnv`; an episode that has ended begins anew in the next step, with a reward of 0
 
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
 

@@ -86,7 +86,7 @@ class FmuLaw:
             self._progress[BUSY] = 0.0
 
     def bind(self, model: StepModel, data: StepData, signals: Signals, forces: Array) -> BoundCall:
-        """Return the call of the FMU with the arrays of a step, as C makes it."""
+        """Return the call of the FMU with the arrays of a step, as C makes it; it writes `forces` [N]."""
         units = signal_units(self._scenario, signals)
         inputs = connect(self.fmu, self._file, units)
         places = {name: i for i, name in enumerate(units)}

@@ -26,7 +26,7 @@ class FmuCalls(NamedTuple):
 
 
 def call_law(fmu: FmuCalls, model: StepModel, data: StepData, forces: Array) -> None:
-    """Let an FMU compute the forces of the coming control period."""
+    """Let an FMU compute the forces [N] of the coming control period."""
     collect_signals(fmu.signals, model, data)
     native, progress, n = fmu.native, fmu.progress, forces.size
     for i in range(fmu.sources.size):

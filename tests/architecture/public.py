@@ -18,6 +18,7 @@ PUBLIC = {
     "controller.quaternion": "from_axis_angle rotation_matrix",
     "controller.regions": "",
     "cosim": "",
+    "cosim.learning.region_env": "RegionEnv",
     "fuzzy_arbiter": "",
     "fuzzy_arbiter.criteria": "",
     "fuzzy_arbiter.export": "",

@@ -24,7 +24,7 @@ _LONGEST_HOLD = 0.95  # quantile of the lengths of holds, beyond which a value i
 
 
 def drop_duplicates(times: Array, keys: Keys) -> Index:
-    """Return the indices of the samples without those that repeat time and value; `keys` stand for values."""
+    """Return the indices of the samples without those that repeat time [s] and value; `keys` stand for values."""
     index: Index = np.arange(len(times))
     order = np.argsort(times, kind="stable")
     if (is_copy := (np.diff(times[order]) == 0.0) & (keys[order[1:]] == keys[order[:-1]])).any():

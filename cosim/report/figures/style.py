@@ -72,7 +72,7 @@ class NamedFigure:
 
 
 def thin(time: Array, signal: Array) -> tuple[Array, Array]:
-    """Thin a signal to the minimum and the maximum value in each part of the time."""
+    """Thin a signal to the minimum and the maximum value in each part of the time [s]."""
     n = len(time)
     if n <= 2 * POINTS:
         return time, signal
