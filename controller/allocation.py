@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from controller.arithmetic import square
 from controller.driven_axes import passive_axes
 from controller.errors import LawError
 from controller.stack_array import Array, Vector6
@@ -54,6 +55,19 @@ def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: V
     # Units of arguments: tau [N, N m]; forces [N]
     forces[:] = inverse @ tau
     return keep_direction(forces, lower, upper) if direction else clip_each(forces, lower, upper)
+
+
+def invert_curve(forces: Array, lower: Array, upper: Array, dead_band: Array, curve: Array) -> None:
+    """Replace the forces of thrusters [N], shape (n,), by the commands [N] that give them; lower, upper [N]."""
+    # A command of the fraction d + (1 - d) s of its limit gives the fraction s (1 - c + c s), with the vehicle's dead
+    # band d and curve c. A force of 0 needs no command.
+    for i in range(forces.size):
+        limit = lower[i] if forces[i] < 0.0 else upper[i]
+        if forces[i] == 0.0 or limit == 0.0 or (dead_band[i] == 0.0 and curve[i] == 0.0):
+            continue
+        fraction, linear = forces[i] / limit, 1.0 - curve[i]
+        live = 2.0 * fraction / (linear + np.sqrt(square(linear) + 4.0 * curve[i] * fraction))
+        forces[i] = limit * (dead_band[i] + (1.0 - dead_band[i]) * live)
 
 
 class Allocation:

@@ -88,6 +88,8 @@ def make_model(scenario: Scenario, law: Law, clock: Integers = NO_CLOCK, for_rec
         through_thrusters=through_thrusters,
         law_gives_wrench=law.output == "wrench",
         thruster_matrix=scenario.vehicle.thruster_matrix[:, : None if through_thrusters else 0],
+        dead_band=np.array(scenario.vehicle.thrust_dead_band, dtype=float),
+        curve=np.array(scenario.vehicle.thrust_curve, dtype=float),
         **{
             field: next((i for i, diagnostic in enumerate(law.diagnostics) if diagnostic.name == name), -1)
             for field, name in (("bound", "bound"), ("isolated", "failed_thruster"), ("limit", "thrust_limit"))

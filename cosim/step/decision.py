@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller.allocation import allocate
+from controller.allocation import allocate, invert_curve
 from cosim.step.arbiter_inputs import compute_inputs
 from cosim.step.plant_calls import seconds
 from cosim.step.sensing import position_is_known
@@ -57,10 +57,12 @@ def control(model: StepModel, data: StepData) -> None:
     elif data.manual == 0:
         data.command[:] = 0.0
     by_wrench = model.law_gives_wrench or not controls(model, data)
-    if by_wrench and model.through_thrusters:
+    if model.through_thrusters:
         stage, allocator = data.stage, data.allocator
         lower, upper, direction = allocator.lower[stage], allocator.upper[stage], allocator.direction
-        data.saturated = allocate(allocator.inverse[stage], lower, upper, direction, data.command, data.thrusts)
+        if by_wrench:
+            data.saturated = allocate(allocator.inverse[stage], lower, upper, direction, data.command, data.thrusts)
+        invert_curve(data.thrusts, lower, upper, model.dead_band, model.curve)
     elif by_wrench:
         data.wrench = data.command
         if model.commands:

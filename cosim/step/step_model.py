@@ -72,6 +72,8 @@ class StepModel(NamedTuple):
     through_thrusters: bool  # True: thrusters give the wrench; False: it acts on the body directly
     law_gives_wrench: bool  # True: the law gives a wrench; False: thruster forces
     thruster_matrix: Array  # (6, m) body wrench of one newton of each thruster; (6, 0) if the plant takes a wrench
+    dead_band: Array  # (m,) fraction of a thruster's range that gives no force, in the vehicle's file
+    curve: Array  # (m,) 0: force linear in the command; 1: quadratic
     bound: int  # index in the law's report of its bound of the clearances; -1: it has none
     isolated: int  # the same of the thruster that it isolated last
     limit: int  # the same of the least limit of a thruster that it estimates

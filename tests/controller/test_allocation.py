@@ -1,12 +1,15 @@
 """Thruster allocation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from controller import LawError
-from controller.allocation import Allocation
+from controller.allocation import Allocation, invert_curve
+from cosim.identification.actuation import steady_forces
 from plant_fmu import load_vehicle
 
 VEHICLE = load_vehicle("odin")
@@ -86,3 +89,16 @@ def test_allocation_reports_saturation():
 def test_invalid_setup_is_rejected(arguments):
     with pytest.raises(LawError):
         Allocation(*arguments)
+
+
+@given(
+    st.lists(st.floats(0.0, 1.0), min_size=8, max_size=8), st.lists(st.floats(0.0, 0.9), min_size=8, max_size=8),
+    st.lists(st.floats(0.0, 1.0), min_size=8, max_size=8),
+)  # fmt: skip
+def test_commands_give_the_forces_by_dead_band_and_curve(fractions, dead, curve):
+    vehicle = replace(VEHICLE, thrust_dead_band=np.array(dead), thrust_curve=np.array(curve))
+    forces = LOW + np.array(fractions) * (HIGH - LOW)
+    commands = forces.copy()
+    invert_curve(commands, LOW, HIGH, np.array(dead), np.array(curve))
+    assert steady_forces(commands, vehicle) == pytest.approx(forces, abs=1e-6)
+    assert np.all((commands == 0.0) == (forces == 0.0)) and np.all((commands >= LOW) & (commands <= HIGH))
