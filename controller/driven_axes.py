@@ -51,13 +51,13 @@ def require_driven(matrix: Array, lower: Array, upper: Array, righting_moment: f
     passive = undriven_axes(matrix, lower, upper)
     if not {ROLL, PITCH} >= set(passive):
         raise LawError(
-            f"thrusters.matrix with its limits does not drive {join_axes(passive)} both ways, expected all axes but "
-            "roll and pitch, which the righting moment may hold"
+            f"thrusters.matrix with its limits does not drive {join_axes(passive)} both ways, or too weakly, expected "
+            "all axes but roll and pitch, which the righting moment may hold"
         )
     if passive and not righting_moment > 0.0:
         raise LawError(
-            f"thrusters.matrix does not drive {join_axes(passive)} both ways, and the righting moment is "
-            f"{righting_moment:.3g} N m, expected more than 0: the center of buoyancy above the center of gravity"
+            f"thrusters.matrix does not drive {join_axes(passive)} both ways, or too weakly, and the righting moment "
+            f"is {righting_moment:.3g} N m, expected more than 0: the center of buoyancy above the center of gravity"
         )
     return passive
 

@@ -38,6 +38,17 @@ class PlantError(PlantFmuError):
     """Raised for an FMU that cannot be loaded, or refuses a value or a step; the message quotes the FMU."""
 
 
+class StepError(PlantError):
+    """Raised for a step that fails: when [s], and why."""
+
+    def __init__(self, time: float, reason: str) -> None:
+        super().__init__(f"t = {time:.6g} s: {reason}")
+        self.time, self.reason = time, reason
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return StepError, (self.time, self.reason)
+
+
 class FmuFileError(PlantFmuError):
     """Raised for a file that is no FMU, or that is unsafe to extract."""
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OK, ERROR, FATAL, DISCARD, END, HANG, NOT_A_NUMBER, NULL_MESSAGE, SHORT, WARNED, PERCENT };
+enum { OK, ERROR, FATAL, DISCARD, END, HANG, NOT_A_NUMBER, NULL_MESSAGE, SHORT, WARNED, PERCENT, NO_INPUT, FORMATS };
 
 /* places in v, which are the value references */
 enum { MODE, AT, GAIN, INPUTS = 10, OUTPUTS = 20, NO_ROLLBACK = 29, MATRIX = 30, SIZE = 34 };
@@ -77,6 +77,9 @@ static STATUS step(Fmu *f, double now, double h, bool no_rollback)
     case PERCENT: /* no format, but written as if it were one */
         LOG(f, S(Error), "fails at 50% speed");
         return S(Error);
+    case FORMATS: /* none of them fits its argument, or any memory */
+        LOG(f, S(Error), "a %s b %s c %*d d %2147483647d %.99999999999f %q", (char *)1234567, (char *)-1, 2000000000, 1);
+        return S(Error);
     case WARNED:
         LOG(f, S(Warning), "x is too large");
         return S(Error);
@@ -89,6 +92,12 @@ static STATUS step(Fmu *f, double now, double h, bool no_rollback)
     default:
         return S(OK);
     }
+}
+
+static STATUS set(Fmu *f, const unsigned r[], size_t n, const double *x)
+{
+    transfer(f, r, n, (double *)x, true);
+    return (int)f->v[MODE] == NO_INPUT && f->last >= f->v[AT] - 1e-9 ? S(Discard) : S(OK);
 }
 
 static STATUS say(Fmu *f, const char *what)
@@ -122,8 +131,7 @@ fmi2Status fmi2GetReal(fmi2Component f, const fmi2ValueReference r[], size_t n, 
 }
 fmi2Status fmi2SetReal(fmi2Component f, const fmi2ValueReference r[], size_t n, const fmi2Real x[])
 {
-    transfer(f, r, n, (double *)x, true);
-    return fmi2OK;
+    return set(f, r, n, x);
 }
 fmi2Status fmi2DoStep(fmi2Component f, fmi2Real now, fmi2Real h, fmi2Boolean no_rollback) { return step(f, now, h, no_rollback); }
 fmi2Status fmi2GetRealStatus(fmi2Component f, const fmi2StatusKind kind, fmi2Real *x)
@@ -166,8 +174,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance f, const fmi3ValueReference r[], size_t n
 fmi3Status fmi3SetFloat64(fmi3Instance f, const fmi3ValueReference r[], size_t n, const fmi3Float64 x[], size_t m)
 {
     (void)m;
-    transfer(f, r, n, (double *)x, true);
-    return fmi3OK;
+    return set(f, r, n, x);
 }
 fmi3Status fmi3DoStep(fmi3Instance f, fmi3Float64 now, fmi3Float64 h, fmi3Boolean no_rollback, fmi3Boolean *event,
                       fmi3Boolean *end, fmi3Boolean *early, fmi3Float64 *last)

@@ -12,7 +12,10 @@ from plant_fmu.compiling.libraries import FMI_HEADERS
 from plant_fmu.compiling.platforms import native_platform
 from tests.architecture.modules import ROOT
 
-MODES = ("ok", "error", "fatal", "discard", "end", "hang", "nan", "null message", "short", "warned", "percent")
+MODES = (
+    "ok", "error", "fatal", "discard", "end", "hang", "nan", "null message", "short", "warned", "percent", "no input",
+    "formats",
+)  # fmt: skip
 PARAMETERS = {"mode": 0, "at": 1, "gain": 2}
 INPUTS = {f"u{i}": 10 + i for i in range(8)}
 OUTPUTS = {f"y{i}": 20 + i for i in range(8)}

@@ -59,7 +59,7 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     yield search_path, (empty_plan(1, 1), state.position, goal, regions, PathLimits(1.0, 1.0, 1.0, 1.0), 1.0, INTEGERS)
     yield compute_inputs, (model.inputs, goal, regions, state, 0.0, FLAT, data.signals)
     references = np.zeros(1, np.uint32)
-    native = Native(0, 0, 0, 0, references, FLAT, references, FLAT, INTEGERS)
+    native = Native(0, 0, 0, 0, references, FLAT, references, FLAT, INTEGERS, FLAT)
     yield call_law, (FmuCalls(native, 0.01, INTEGERS, INTEGERS, FLAT, FLAT), model, data, FLAT)
     *_, (function, arguments), start = step_functions(scenario, law)
     yield fly, (*arguments[:3], FlightMetrics(), FLAT, arguments[-1])

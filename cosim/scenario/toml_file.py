@@ -21,6 +21,7 @@ _RENAMED = {"centre": "center", "colour": "color"}  # former names of keys
 ANGLE_KEYS = {"quaternion": "roll_pitch_yaw", "desired_quaternion": "desired_roll_pitch_yaw"}
 _IN_ITS_PLACE = _RENAMED | ANGLE_KEYS  # of two keys for one thing, the one that the other replaces
 _IN_ITS_PLACE |= {new: old for old, new in _IN_ITS_PLACE.items()}
+_DEFAULT_LAW = "ismail_dunnigan"
 _SHOWN = 80  # maximum number of characters quoted in a message
 
 # a key: parts with dots between them, and TOML's quotes around those that have blanks; and a key with a value
@@ -90,7 +91,7 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
             raise ScenarioError(f"{name}: base is {base!r}, expected the name of a scenario")
         below, _, titled = read_table(base, (*seen, name_or_file), folder)
         law = table.get("law")
-        if isinstance(law, dict) and (law.get("file") or "name" in law):
+        if isinstance(law, dict) and ("file" in law or "name" in law):
             _name_law(below, law.get("name"), law.get("file"))
         arbiter = table.get("arbiter")
         if isinstance(arbiter, dict) and "file" in arbiter:
@@ -104,13 +105,17 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
 
 
 def _name_law(table: dict[str, Any], name: object, file: object = "") -> None:
-    """Set the law's name or FMU in a table, and drop what belongs to another law."""
+    """Set the law's name or FMU in a table, or remove its FMU; drop what belongs to another law."""
     law = table.setdefault("law", {})
-    if isinstance(law, dict) and file:
+    if not isinstance(law, dict):
+        return
+    if name is None and not file:
+        name = _DEFAULT_LAW if law.get("file") else _present_name(law)
+    if file:
         law.pop("name", None)
         law.pop("gains", None)
         law.pop("digest", None)
-    elif isinstance(law, dict) and _present_name(law) != name:
+    elif _present_name(law) != name:
         for key in ("gains", "file", "inputs", "outputs", "parameters", "digest"):
             law.pop(key, None)
         law["name"] = name
@@ -118,7 +123,7 @@ def _name_law(table: dict[str, Any], name: object, file: object = "") -> None:
 
 def _present_name(law: dict[str, Any]) -> object:
     """Return the name of a law: that of its FMU's file, which needs no key, or that of the key."""
-    return Path(str(law["file"])).name if law.get("file") else law.get("name", "ismail_dunnigan")
+    return Path(str(law["file"])).name if law.get("file") else law.get("name", _DEFAULT_LAW)
 
 
 def _name_rules(table: dict[str, Any]) -> None:

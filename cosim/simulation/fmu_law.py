@@ -16,9 +16,10 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.fmu_map import connect, law_targets, read_fmu_of, signal_units
 from cosim.simulation.signals import Signals
 from cosim.simulation.watchdog import Watchdog
-from cosim.step.fmu_call import BUSY, FAILED, STEPS, FmuCalls, call_law
+from cosim.step.fmu_call import BUSY, FAILED, NOW, STEPS, FmuCalls, call_law
 from cosim.step.step_model import StepData, StepModel
 from plant_fmu import Plant, PlantError
+from plant_fmu.errors import StepError
 
 
 def make_law(scenario: Scenario) -> Law:
@@ -98,22 +99,20 @@ class FmuLaw:
 
     def raise_error(self) -> None:
         """Raise the error of the last step, if it failed."""
-        failed, time = int(self._progress[FAILED]), self._progress[STEPS] * self._period
+        failed, now = int(self._progress[FAILED]), float(self._progress[NOW])
         if failed > 0:
-            value = self._native.outputs[failed - 1]
-            name = self._outputs[failed - 1]
-            raise PlantError(
-                f"{self.name}: t = {time - self._period:.6g} s: {name} is {value}, expected a finite force"
-            )
+            value, name = self._native.outputs[failed - 1], self._outputs[failed - 1]
+            raise PlantError(f"{self.name}: t = {now:.6g} s: {name} is {value}, expected a finite force")
         if failed < 0:
-            self._raise_failure()
+            self._raise_failure(now)
 
-    def _raise_failure(self) -> NoReturn:
+    def _raise_failure(self, now: float) -> NoReturn:
         self._plant.count_steps(int(self._progress[STEPS]) - 1)
+        begin = self._plant.time  # the FMU's own, which begins again where the law regains control
         try:
-            self._plant.raise_failure(self._native.results)
-        except PlantError as error:
-            raise PlantError(f"{self.name}: {error}") from error
+            self._plant.raise_failure(self._native)
+        except StepError as error:
+            raise PlantError(f"{self.name}: t = {now + error.time - begin:.6g} s: {error.reason}") from error
 
     def step(self, *arguments: Any) -> None:
         """Raise an error, as a step needs all signals of a run: C calls the FMU."""

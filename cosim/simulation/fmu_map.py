@@ -64,12 +64,12 @@ def connect(fmu: UserFmu, file: FmuFile, units: Mapping[str, str | None]) -> dic
         variable = _variable(fmu, file, key, name, "input")
         if signal not in units:
             raise ScenarioError(f"{key} is {signal!r}, which is no signal; {hint(signal, _public(units))}")
-        _require_unit(key, file, variable, units[signal])
+        require_unit(key, file, variable, units[signal])
     connected = dict(fmu.inputs)
     for variable, names in _unmapped(file, "input", fmu.inputs):
         signal = next((name for name in names if name in units), "")
         if signal:
-            _require_unit(f"{fmu.key}.inputs.{variable.name}", file, variable, units[signal])
+            require_unit(f"{fmu.key}.inputs.{variable.name}", file, variable, units[signal])
             connected[variable.name] = signal
     return connected
 
@@ -86,12 +86,12 @@ def law_targets(fmu: UserFmu, file: FmuFile, scenario: Scenario) -> tuple[dict[s
             raise ScenarioError(f"{key} is {target!r}, which no law sets; {hint(target, known)}")
         if target in targets.values():
             raise ScenarioError(f"{key} is {target!r}, which another output sets")
-        _require_unit(key, file, variable, known[target])
+        require_unit(key, file, variable, known[target])
         targets[name] = target
     for variable, names in _unmapped(file, "output", fmu.outputs):
         target = next((name for name in names if name in known and name not in targets.values()), "")
         if target:
-            _require_unit(f"{fmu.key}.outputs.{variable.name}", file, variable, known[target])
+            require_unit(f"{fmu.key}.outputs.{variable.name}", file, variable, known[target])
             targets[variable.name] = target
     of_thrusters, of_wrench = (any(t in names for t in targets.values()) for names in (thrust, _WRENCH))
     if of_thrusters == of_wrench:
@@ -142,7 +142,7 @@ def _signal_of(*parts: str) -> str:
     return ".".join((*(part for part in above if part != "pose"), member))
 
 
-def _require_unit(key: str, file: FmuFile, variable: ModelVariable, expected: str | None) -> None:
+def require_unit(key: str, file: FmuFile, variable: ModelVariable, expected: str | None) -> None:
     """Raise an error for a variable whose unit is another one."""
     if expected is None or not variable.unit or _is_unit(file.units.get(variable.unit, {}), variable.unit, expected):
         return
@@ -156,7 +156,7 @@ def _is_unit(definition: Mapping[str, str], unit: str, expected: str) -> bool:
     if unit.replace("*", ".").replace(" ", ".") == expected or (expected not in UNITS and expected):
         return True
     if not definition:
-        return (unit, expected) in (("Nm", "N.m"), ("1", ""))
+        return (unit, expected) in (("Nm", "N.m"), ("1", ""), ("-", ""))
     wanted = base_unit(expected) if expected else {}
     factors = [float(base.get("factor", 1.0)) for base in (definition, wanted)]
     powers = [

@@ -30,7 +30,7 @@ def step_functions(scenario: Scenario, law: Law) -> list[tuple[Callable[..., Non
         scenario, model, law, step_signals(scenario, law, inputs, outputs), inputs, outputs, np.zeros((0, 6))
     )
     references = np.zeros(1, np.uint32)
-    calls = PlantCalls(*[Native(0, 0, 0, 0, references, FLAT, references, FLAT, INTEGERS)] * 3)
+    calls = PlantCalls(*[Native(0, 0, 0, 0, references, FLAT, references, FLAT, INTEGERS, FLAT)] * 3)
     of_law = [law.step_call(*law_arguments(model, data))] if is_compiled(law) else []
     return [*of_law, (advance, (model, data, calls, INTEGERS, np.zeros((0, 0)))), (show_start, (model, data, calls))]
 

@@ -104,7 +104,7 @@ class BoundPlant:
     def raise_failure(self) -> NoReturn:
         """Raise the error of an FMU's step that failed."""
         assert isinstance(self._plant, Plant)
-        self._plant.raise_failure(self.calls.native.results)
+        self._plant.raise_failure(self.calls.native)
 
 
 def plant_calls(
@@ -121,7 +121,8 @@ def _effectiveness_names(vehicle: Vehicle) -> tuple[str, ...]:
 
 def _buffers(inputs: Array, outputs: Array = _NONE, flags: Any = _NO_FLAGS) -> Native:
     """Return buffers without C functions."""
-    return Native(0, 0, 0, 0, _NO_REFERENCES, inputs, _NO_REFERENCES, outputs, np.zeros(5, np.int64), flags=flags)
+    results = np.zeros(5, np.int64), np.full(1, np.nan)
+    return Native(0, 0, 0, 0, _NO_REFERENCES, inputs, _NO_REFERENCES, outputs, *results, flags=flags)
 
 
 _STATES = 13  # outputs of pose and velocity, the first ones

@@ -6,11 +6,11 @@ import math
 from typing import NamedTuple
 
 from cosim.step.plant_calls import fmi_do_step, fmi_get, fmi_set
+from cosim.step.region_positions import RegionEvaluation
 from cosim.step.step_model import Array, Integers, StepData, StepModel
 from plant_fmu.running.native import Native
 
 STEPS, BUSY, NOW, FAILED = range(4)  # indices in `FmuCalls.progress`
-N_OWN = 13  # number of signals of the measured motion, which come first
 
 
 class FmuCalls(NamedTuple):
@@ -21,8 +21,10 @@ class FmuCalls(NamedTuple):
     sources: Integers  # (i,) index in `signals` of each input
     targets: Integers  # (o,) index among forces and estimate of each output
     signals: Array  # measured motion (13), weights (n), values (n + 1), clearances (n + 1), gradients (3 n + 3), row
-    progress: Array  # (4,) steps done; 1 during a step; time of the run [s]; -1 for a failed step, else 1 + the output
-    # that is not finite
+    progress: (
+        Array  # (4,) steps done; 1 during a step; time of the run at its begin [s]; -1: it failed; n: output n - 1
+    )
+    # is not finite
 
 
 def call_law(fmu: FmuCalls, model: StepModel, data: StepData, forces: Array) -> None:
@@ -61,14 +63,16 @@ def collect_signals(signals: Array, model: StepModel, data: StepData) -> None:
     signals[:3], signals[3:7], signals[7:13] = state.position, state.quaternion, state.velocity_body
     signals[13 : 13 + n] = data.weights
     first, m = 13 + n, n + 1
+    if model.exact:
+        write_evaluation(signals[first:], data.true_evaluation)
+    else:
+        write_evaluation(signals[first:], data.arbiter_evaluation)
+    signals[first + 5 * m :] = data.row
+
+
+def write_evaluation(signals: Array, evaluation: RegionEvaluation) -> None:
+    """Write values, clearances and gradients of goal and regions side by side."""
+    m = evaluation.values.size
+    signals[:m], signals[m : 2 * m] = evaluation.values, evaluation.clearances
     for i in range(m):
-        if model.exact:
-            signals[first + i] = data.true_evaluation.values[i]
-            signals[first + m + i] = data.true_evaluation.clearances[i]
-            signals[first + 2 * m + 3 * i : first + 2 * m + 3 * i + 3] = data.true_evaluation.gradients[i]
-        else:
-            signals[first + i] = data.arbiter_evaluation.values[i]
-            signals[first + m + i] = data.arbiter_evaluation.clearances[i]
-            signals[first + 2 * m + 3 * i : first + 2 * m + 3 * i + 3] = data.arbiter_evaluation.gradients[i]
-    first += 5 * m
-    signals[first:] = data.row
+        signals[2 * m + 3 * i : 2 * m + 3 * i + 3] = evaluation.gradients[i]

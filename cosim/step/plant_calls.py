@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.translator.foreign import BOOL, DOUBLE, INT, POINTER, SIZE, call_c
-from plant_fmu.running.native import Native
+from plant_fmu.running.native import Native, stops_early
 
 _WARNING = 1  # the highest status that is not a failure
-_ENDED, _STATUS = 1, 4  # indices of terminateSimulation, and of the status, in the results of fmi3DoStep
+_ENDED, _STEP_STATUS, _TRANSFER_STATUS = 1, 3, 4  # indices in `Native.results`
 
 # arguments of the C functions
 _TRANSFER = (POINTER, POINTER, SIZE, POINTER, SIZE)  # fmi3SetFloat64, fmi3GetFloat64
@@ -57,23 +57,27 @@ def _transfer(native: Native, function: int, references: NDArray[np.uint32], val
     if function == 0 or n == 0:  # some FMUs refuse a call without variables
         return True
     if native.fmi == 2:
-        return call_c(function, _TRANSFER_2, native.instance, references, n, values) <= _WARNING
-    return call_c(function, _TRANSFER, native.instance, references, n, values, n) <= _WARNING
+        status = call_c(function, _TRANSFER_2, native.instance, references, n, values)
+    else:
+        status = call_c(function, _TRANSFER, native.instance, references, n, values, n)
+    native.results[_TRANSFER_STATUS] = status
+    return status <= _WARNING
 
 
 def fmi_do_step(native: Native, now: float, step: float) -> bool:
-    """Step from `now` [s] by `step` [s]; return True unless the FMU fails or ends the simulation."""
-    # The results by pointer, three of them Booleans of one byte, are stored in elements of eight bytes. The FMU may
-    # discard its state before the step.
+    """Step from `now` [s] by `step` [s]; return True unless the FMU fails, stops early or ends the simulation."""
+    # The FMU may discard its state before the step.
     out = native.results
     if native.do_step == 0:
         return True
     if native.fmi == 2:
         status = call_c(native.do_step, _DO_STEP_2, native.instance, now, step, 1)
     else:
-        status = call_c(native.do_step, _DO_STEP, native.instance, now, step, True, out, out[1:], out[2:], out[3:])
-    out[_STATUS] = status
-    return status <= _WARNING and out[_ENDED] == 0
+        status = call_c(
+            native.do_step, _DO_STEP, native.instance, now, step, True, out, out[1:], out[2:], native.reached
+        )
+    out[_STEP_STATUS] = status
+    return status <= _WARNING and out[_ENDED] == 0 and not stops_early(native.reached[0], now + step, step)
 
 
 class Clock:

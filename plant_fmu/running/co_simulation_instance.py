@@ -14,17 +14,20 @@ import numpy as np
 from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
 from numpy.typing import NDArray
 
-from plant_fmu.errors import PlantError
+from plant_fmu.errors import PlantError, StepError
 from plant_fmu.model_variables import ModelVariable
 from plant_fmu.running.channels import DOUBLES, BoundCalls
 from plant_fmu.running.instance import Instance
 from plant_fmu.running.messages import WARNING
+from plant_fmu.running.native import Native, stops_early
 from plant_fmu.running.state import Clock
 from plant_fmu.running.values import Value, convert_value, convert_values, require_settable
 
 _MAX_STEP = 1e9  # s, bound of a step
 _DISCARD = 2  # status of FMI 2.0 and 3.0
-_ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
+_STATUS = {_DISCARD: "Discard", 3: "Error", 4: "Fatal", 5: "Pending"}
+_ROUNDING = 1e-6  # tolerance of a step's length, as a fraction
+_PARTIAL = "made a part of the step alone"
 _ENDS = "the FMU requests the end of the simulation"
 _AT_ZERO = Clock(0.0, 0, math.nan)
 _FORMER_NAMES = {
@@ -159,7 +162,9 @@ class CoSimulationInstance:
         if self._terminated:
             raise PlantError(f"plant {self.name} is terminated; reset() it first")
         time = _number("start time", time, "seconds")
-        if stop_time is not None and _number("stop time", stop_time, "seconds") < time:
+        if not math.isfinite(time):
+            raise PlantError(f"start time is {time} s, expected a finite number of seconds")
+        if stop_time is not None and not _number("stop time", stop_time, "seconds") >= time:
             raise PlantError(f"stop time is {stop_time} s, expected {time} s (start time) or later")
         if tolerance is not None and not _number("tolerance", tolerance, "a number") > 0.0:
             raise PlantError(f"tolerance is {tolerance}, expected a number above 0")
@@ -209,12 +214,12 @@ class CoSimulationInstance:
             self._fail_step(status)
         self._count = count = self._count + 1
         self.time = self._start + count * self._step
-        if self._last.value < self.time - _ROUNDING * self._step:
-            self._stop_early(self._last.value, "made a part of the step alone")
+        if stops_early(self._last.value, self.time, self._step):
+            self._stop_early(self._last.value, _PARTIAL)
         if (status := get_outputs(*output_arguments)) > WARNING:
             self._fail(status)
         if self._ended.value:
-            raise PlantError(f"t = {self.time:.6g} s: {_ENDS}")
+            raise StepError(self.time, _ENDS)
 
     def prepare_steps(self, step: float) -> None:
         """Prepare steps of `step` seconds by the functions of `native_channels`."""
@@ -227,22 +232,24 @@ class CoSimulationInstance:
         self._count += n
         self.time = self._start + self._count * self._step
 
-    def raise_failure(self, results: NDArray[np.int64]) -> NoReturn:
-        """Raise the error of a step by the functions of `native_channels`, or that the FMU ends after it."""
-        ended, status = bool(results[1]), int(results[4])
-        self._now.value, self._ended.value, self._last.value = self.time, ended, float(results[3:4].view(np.float64)[0])
-        if status == _DISCARD:
+    def raise_failure(self, native: Native) -> NoReturn:
+        """Raise the error of a step by functions of `native` or `native_channels`, or that the FMU ends after it."""
+        _, ended, _, status, transferred = native.results.tolist()
+        self._now.value, self._ended.value, self._last.value = self.time, bool(ended), float(native.reached[0])
+        if transferred > WARNING:
+            self._fail(transferred)
+        if status > WARNING:
             self._fail_step(status)
-        self.count_steps(int(ended))
-        if ended:
-            raise PlantError(f"t = {self.time:.6g} s: {_ENDS}")
-        self._fail(status)
+        if not ended:
+            self._stop_early(self._last.value, _PARTIAL)
+        self.count_steps(1)
+        raise StepError(self.time, _ENDS)
 
     def _fail(self, status: int) -> NoReturn:
         """Raise the error of a call in a step; the next step checks whether there can be one."""
         self._step = math.nan
         self._instance.life.note(status)
-        raise PlantError(f"t = {self.time:.6g} s: {self._failure_message()}")
+        raise StepError(self.time, self._failure_message(status))
 
     def _fail_step(self, status: int) -> NoReturn:
         """Raise the error of `doStep`: an FMU that discards a step may have made a part of it, and may have ended."""
@@ -263,7 +270,7 @@ class CoSimulationInstance:
         with contextlib.suppress(PlantError):
             self._read()
         reason = reason if reason.startswith("the FMU") else f"the FMU {reason}"
-        raise PlantError(f"t = {self.time:.6g} s: {reason}")
+        raise StepError(self.time, reason)
 
     def _change_step(self, step: float) -> None:
         """Prepare steps of another length than before."""
@@ -288,24 +295,27 @@ class CoSimulationInstance:
 
     def _send(self) -> None:
         set_inputs, input_arguments = self._bound.set_inputs
-        if set_inputs(*input_arguments) > WARNING:
-            raise PlantError(f"the inputs are refused: {self._failure_message()}")
+        self._require_success(set_inputs(*input_arguments), "the inputs are refused")
 
-    def _failure_message(self) -> str:
-        return self._instance.messages.take_failures() or "the FMU failed without a message"
+    def _require_success(self, status: int, what: str) -> None:
+        if status > WARNING:
+            self._instance.life.note(status)
+            raise PlantError(f"{what}: {self._failure_message(status)}")
+
+    def _failure_message(self, status: int) -> str:
+        name = _STATUS.get(status, f"unknown status {status}")
+        return self._instance.messages.take_failures() or f"the FMU failed without a message: {name}"
 
     def _read(self) -> None:
         get_outputs, output_arguments = self._bound.get_outputs
-        if get_outputs(*output_arguments) > WARNING:
-            raise PlantError(f"the outputs cannot be read: {self._failure_message()}")
+        self._require_success(get_outputs(*output_arguments), "the outputs cannot be read")
 
     def read_flags(self) -> NDArray[np.bool_]:
         """Read the Boolean outputs after the last step; returns (n,)."""
         if not self.initialized:
             self._require_initialized("has no flags")
         get_flags, flag_arguments = self._bound.get_flags
-        if get_flags(*flag_arguments) > WARNING:
-            raise PlantError(f"the flags cannot be read: {self._failure_message()}")
+        self._require_success(get_flags(*flag_arguments), "the flags cannot be read")
         return self.flags.values
 
     def close(self) -> None:

@@ -23,6 +23,7 @@ _CONVERSION = re.compile(r"%([-+ #0]*)(\*|\d+)?(?:\.(\*|\d*))?(hh|h|ll|l|j|z|t|I
 _BITS = {"hh": 8, "h": 16, "l": 8 * ctypes.sizeof(ctypes.c_long), **dict.fromkeys(("ll", "j", "z", "t", "I64"), 64)}
 _STACK = 16  # number of words of the stack that are read as arguments
 _FIRST_PAGE = 4096  # bytes, where no text is
+_LONGEST = 4096  # maximum number of characters of an argument, of its width and of its precision
 
 # Variable arguments after five of the logger, by calling convention: words that are no arguments, and the numbers of
 # further words and of floating-point numbers in registers. The others follow on the stack, in order.
@@ -110,13 +111,16 @@ def _parts(text: str, next_word: Callable[[], int], next_float: Callable[[], flo
                 width = str(_signed(next_word(), 32))
             if precision == "*":
                 precision = str(_signed(next_word(), 32))
-            form = f"%{flags}{width or ''}{'' if precision is None else f'.{precision}'}"
+            length = None if precision is None or precision.startswith("-") else int(precision or 0)
+            if max(abs(int(width or 0)), length or 0) > _LONGEST:
+                raise ValueError("no format of a message")
+            form = f"%{flags}{width or ''}{'' if length is None else f'.{length}'}"
             if kind == "%":
                 yield "%"
             elif kind in "eEfFgG":
                 yield f"{form}{kind}" % next_float()
             elif kind == "s":
-                yield f"{form}s" % _string_at(next_word(), None if precision is None else int(precision or 0))
+                yield f"{form}s" % _string_at(next_word(), length)
             elif kind == "p":
                 yield f"{next_word():#x}"
             elif kind in "di":
@@ -124,23 +128,11 @@ def _parts(text: str, next_word: Callable[[], int], next_float: Callable[[], flo
             else:
                 number = next_word() % 2 ** _BITS.get(size, 32)
                 yield f"{form}{kind}" % (number % 256 if kind == "c" else number)
-        except StopIteration:  # more arguments than are read
+        except (StopIteration, ValueError, OverflowError):  # more arguments than are read, or no format
             end = start
             break
         end = match.end()
     yield text[end:]
-
-
-def _is_readable(address: int) -> bool:
-    """Return False for an address that Linux knows to be none."""
-    try:
-        with open("/proc/self/mem", "rb", buffering=0) as memory:
-            memory.seek(address)
-            return len(memory.read(1)) == 1
-    except FileNotFoundError:
-        return True
-    except (OSError, ValueError, OverflowError):
-        return False
 
 
 def _signed(word: int, bits: int) -> int:
@@ -149,14 +141,24 @@ def _signed(word: int, bits: int) -> int:
 
 
 def _string_at(address: int, length: int | None) -> str:
-    """Return the text at an address, up to its end or to a length."""
+    """Return the text at an address, up to its end or to a length; "(unknown)" where there is none."""
     if address < _FIRST_PAGE:
         return "(null)"
-    if not _is_readable(address):  # the message was no format
+    size = _LONGEST if length is None else length
+    try:
+        with open("/proc/self/mem", "rb", buffering=0) as memory:  # an address that is none is an error here
+            memory.seek(address)
+            data = memory.read(size)
+    except FileNotFoundError:  # no Linux
+        data = ctypes.string_at(address) if length is None else _bytes_at(address, length)
+    except (OSError, ValueError, OverflowError):  # the message was no format
         return "(unknown)"
+    return data.partition(b"\0")[0].decode("utf-8", "replace")
+
+
+def _bytes_at(address: int, length: int) -> bytes:
+    """Return the bytes at an address, up to a zero or to a length."""
     data = bytearray()
-    if length is None:
-        return ctypes.string_at(address).decode("utf-8", "replace")
     while len(data) < length and (byte := ctypes.c_ubyte.from_address(address + len(data)).value):
         data.append(byte)
-    return data.decode("utf-8", "replace")
+    return bytes(data)

@@ -29,7 +29,9 @@ class Native(NamedTuple):
     inputs: NDArray[np.float64]  # (n,) values sent by set_values
     output_references: NDArray[np.uint32]  # (m,) value references of the outputs
     outputs: NDArray[np.float64]  # (m,) values filled in by get_values
-    results: NDArray[np.int64]  # (5,) results of fmi3DoStep by pointer, each at the first byte of its element; status
+    results: NDArray[np.int64]  # (5,) event, end and early return of fmi3DoStep, each in the first byte of its element;
+    # its status; that of the last set_values, get_values or get_flags
+    reached: NDArray[np.float64]  # (1,) s, last successful time of fmi3DoStep; NaN if the FMU does not say
     get_flags: int = 0  # fmi3GetBoolean
     flag_references: NDArray[np.uint32] = _NO_REFERENCES  # (f,) value references of the Boolean outputs
     flags: NDArray[np.bool_] = _NO_FLAGS  # (f,) values filled in by get_flags; none of FMI 2.0
@@ -56,11 +58,18 @@ def native_calls(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str
         output_references=_references(instance, outputs),
         outputs=np.zeros(len(outputs)),
         results=np.zeros(5, np.int64),
+        reached=np.full(1, np.nan),
         get_flags=address(f"fmi{instance.fmi}GetBoolean"),
         flag_references=_references(instance, flags, ("Boolean",)),
         flags=np.zeros(len(flags), np.bool_),
         fmi=instance.fmi,
     )
+
+
+def stops_early(reached: float, end: float, step: float) -> bool:
+    """Return True if the last successful time of a step [s] is before its end [s]; NaN is no time."""
+    # an FMU may add up its own small steps, whose sum differs by rounding
+    return end - reached > 1e-6 * step + 1e-9 * abs(end)
 
 
 def _references(instance: Instance, names: tuple[str, ...], types: tuple[str, ...] = DOUBLES) -> NDArray[np.uint32]:

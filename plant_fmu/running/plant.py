@@ -168,10 +168,10 @@ class Plant(CoSimulationInstance):
         return jacobian
 
     def native(self, inputs: Sequence[str], outputs: Sequence[str]) -> Native:
-        """Return the C functions of an initialized FMI 3.0 plant for a compiled loop.
+        """Return the C functions of an initialized plant for a compiled loop.
 
-        Such a loop steps the FMU without this object: `time` and the channels do not change, so `reset` the
-        plant, or close it, afterwards.
+        Such a loop steps the FMU without this object: `time` and the channels do not change. Tell it by `count_steps`
+        and `raise_failure`, or `reset` the plant, or close it, afterwards.
 
         Parameters
         ----------
@@ -186,7 +186,7 @@ class Plant(CoSimulationInstance):
         Raises
         ------
         PlantError
-            If the plant is not initialized or of another version, or a variable is no real scalar.
+            If the plant is not initialized, or a variable is no real scalar.
         """
         self._require_initialized("cannot be stepped")
         return native_calls(self._instance, tuple(inputs), tuple(outputs))

@@ -62,11 +62,10 @@ def convert_value(variable: ModelVariable, value: Any) -> Value:
 
 
 def _clip(variable: ModelVariable, value: float) -> float:
-    for bound in (variable.minimum, variable.maximum):
+    for bound, sign in ((variable.minimum, -1.0), (variable.maximum, 1.0)):
         with contextlib.suppress(ValueError):  # there is none, or it is no number
             number = float(bound)
-            is_beyond = value < number if bound is variable.minimum else value > number
-            if is_beyond and abs(value - number) <= _ROUNDING * (abs(number) or 1.0):
+            if 0.0 < sign * (value - number) <= _ROUNDING * (abs(number) or 1.0):
                 return number
     return value
 

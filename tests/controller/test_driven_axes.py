@@ -119,7 +119,9 @@ def test_underactuated_vehicle_is_refused_by_its_axes(keep, words):
 
 def test_vehicle_that_does_not_right_itself_is_refused():
     law, vehicle = LAWS["deployable"], dataclasses.replace(ROV, r_B=-ROV.r_B)
-    with pytest.raises(LawError, match=r"does not drive pitch both ways, and the righting moment is -11.2 N m"):
+    with pytest.raises(
+        LawError, match=r"does not drive pitch both ways, or too weakly, and the righting moment is -11.2 N m"
+    ):
         law.for_vehicle(vehicle_model(vehicle), law.gains_type(), LEVEL, 0.02, 0)
 
 

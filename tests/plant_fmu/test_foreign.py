@@ -52,7 +52,8 @@ def made(foreign, fmi):
         ("fatal", 1.0, ("out of memory",) * 2),
         ("discard", 1.25, ("the FMU discarded the step",) * 2),
         ("end", 1.25, ("the FMU requests the end of the simulation",) * 2),
-        ("null message", 1.0, ("the FMU failed without a message",) * 2),
+        ("null message", 1.0, ("the FMU failed without a message: Error",) * 2),
+        ("no input", 1.0, ("the FMU failed without a message: Discard",) * 2),
         ("warned", 1.0, ("x is too large",) * 2),
         ("percent", 1.0, ("fails at 50",) * 2),
     ],
@@ -77,12 +78,33 @@ def test_failures_are_told_apart(made, fmi, mode, time, words):
 
 def test_a_part_of_a_step_is_no_step(made, fmi):
     plant = made("short")
-    if fmi == 2:  # says nothing of a step that succeeded
+    if fmi == 2:  # says nothing of how far a step went that succeeded
         plant.step(0.5)
         return
     with pytest.raises(PlantError, match=r"t = 1.25 s: the FMU made a part of the step alone"):
         plant.step(0.5)
     assert plant.time == 1.25
+
+
+def test_formats_that_do_not_fit_are_survived(made, fmi):
+    """The conversions before the first that is none are made."""
+    with pytest.raises(PlantError) as caught:
+        made("formats").step(0.5)
+    if fmi == 2 and sys.platform == "linux":
+        assert str(caught.value) == "t = 1 s: a (unknown) b (unknown) c %*d d %2147483647d %.99999999999f %q"
+
+
+def test_sums_of_small_steps_are_whole_steps(tmp_path):
+    """An FMU that adds up its own steps is late by a rounding, more at later times."""
+    with Plant(build_foreign_fmu(tmp_path / "it.fmu", 3)) as plant:
+        plant.set({"mode": MODES.index("short"), "at": 1.0})
+        plant.initialize(1e6)
+        plant.step(1e-3)  # reaches 0.5 ms less: within a billionth of the time
+        plant.reset()
+        plant.set({"mode": MODES.index("short"), "at": 1.0})
+        plant.initialize(1e6)
+        with pytest.raises(PlantError, match="the FMU made a part of the step alone"):
+            plant.step(1.0)
 
 
 @pytest.mark.parametrize(("mode", "words"), [("ok", ["terminated", "freed"]), ("discard", ["terminated", "freed"]),
@@ -129,6 +151,8 @@ def test_experiment_is_passed(made):
     for wrong, words in (
         ({"stop_time": -1.0}, "stop time is -1.0 s, expected 0.0 s"),
         ({"tolerance": -1e-6}, "expected a number above 0"),
+        ({"stop_time": float("nan")}, "stop time is nan s, expected 0.0 s"),
+        ({"time": float("nan")}, "start time is nan s, expected a finite number"),
         ({"tolerance": float("nan")}, "tolerance is nan"), ({"stop_time": "1"}, "stop time is '1', expected seconds"),
     ):  # fmt: skip
         with pytest.raises(PlantError, match=words):
@@ -205,6 +229,20 @@ def test_what_other_tools_take_is_taken(fmi, tmp_path):
         plant["u0"] = 3.0
         plant.step(0.1)
         assert plant["y0"] == 6.0
+
+
+def test_rounding_beyond_either_end_of_a_range_is_clipped(fmi, tmp_path):
+    path = build_foreign_fmu(tmp_path / "it.fmu", fmi)
+    files = members(path)
+    xml = files["modelDescription.xml"].replace(b'start="1.0"', b'start="1.0" min="1" max="1"')
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in (files | {"modelDescription.xml": xml}).items():
+            archive.writestr(name, data)
+    with Plant(path) as plant:
+        plant.initialize()
+        for value in (1.0 - 1e-12, 1.0 + 1e-12):
+            plant["gain"] = value
+            assert plant["gain"] == 1.0
 
 
 PYTHON_FMU = """

@@ -79,6 +79,7 @@ class Flight:
             output_references=references(outputs),
             outputs=np.zeros(len(outputs)),
             results=np.zeros(5, np.int64),
+            reached=np.zeros(1),
             get_flags=Expression("(intptr_t)fmi3GetBoolean"),
             flag_references=references(flags),
             flags=np.zeros(len(flags), np.bool_),

@@ -102,7 +102,9 @@ def with_thrusters(model, keep):
 
 @pytest.mark.medium
 def test_vehicle_without_force_in_every_direction_is_rejected():
-    with pytest.raises(LawError, match=r"does not drive roll both ways, and the righting moment is 0 N m"):
+    with pytest.raises(
+        LawError, match=r"does not drive roll both ways, or too weakly, and the righting moment is 0 N m"
+    ):
         min_forces(with_thrusters(MODELS["bluerov2_heavy"], [0, 1, 2, 3, 4, 6]), 0.35)
 
 

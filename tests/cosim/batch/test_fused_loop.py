@@ -235,11 +235,11 @@ def test_do_step_receives_arguments_and_returns_its_status(status, ends, goes_on
 
     none = np.zeros(0)
     address = ctypes.cast(do_step, ctypes.c_void_p).value
-    results = np.zeros(5, np.int64)
-    native = Native(1234, 0, 0, address, np.zeros(0, np.uint32), none, np.zeros(0, np.uint32), none, results)
+    results = np.zeros(5, np.int64), np.full(1, np.nan)
+    native = Native(1234, 0, 0, address, np.zeros(0, np.uint32), none, np.zeros(0, np.uint32), none, *results)
     assert fmi_do_step(native, 1.5, 0.25) == goes_on
     assert came == [(1234, 1.5, 0.25, True)]
-    assert results[3:4].view(float)[0] == 1.75 and results[4] == status
+    assert native.reached[0] == 1.75 and native.results[3] == status
 
 
 def test_clock_agrees_with_python_monotonic():

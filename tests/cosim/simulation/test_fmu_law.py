@@ -1,10 +1,15 @@
 """An FMU of the user's as the law: the same bits as the law that it was made of, its map, and each of its failures."""
 
+import contextlib
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +24,7 @@ from cosim.errors import ScenarioError
 from cosim.scenario.scenario import files_of
 from cosim.simulation.commands import commands as cmd
 from cosim.simulation.commands.sources import CommandQueue
+from cosim.simulation.fmu_map import require_unit
 from cosim.ssp.controller import controller_component
 from plant_fmu import PlantError
 from plant_fmu.build import cached_fmu
@@ -94,9 +100,9 @@ def test_all_signals_that_a_law_receives_can_be_connected(fmus):
     signals = ["SR1.value", "goal.clearance", "goal.gradient.x", "weight.SR1", "membership.obstacle", "time"]
     changes = [f"law.inputs.{name}={signal}" for name, signal in zip(VELOCITY, signals, strict=True)]
     run = kept_rows(braked(fmus, 3, *changes, "law.parameters.gain=1.0"))
-    for i, signal in enumerate(signals):
-        if signal != "goal.gradient.x" and not signal.startswith("weight."):
-            np.testing.assert_array_equal(run[list(WRENCH)[i]][:-1], run[signal][:-1], signal)
+    for i, name in enumerate(signals):
+        if name != "goal.gradient.x" and not name.startswith("weight."):
+            np.testing.assert_array_equal(run[list(WRENCH)[i]][:-1], run[name][:-1], name)
     assert (run["wrench.Z"][:-1] != 0.0).all()
 
 
@@ -129,6 +135,25 @@ def test_invalid_maps_are_refused(fmus, changes, words, capsys, monkeypatch, tmp
     assert captured.err.count("\n") == 1 and not (tmp_path / "run").exists()
 
 
+@pytest.mark.parametrize(
+    ("unit", "factors", "expected", "fits"),
+    [
+        ("", None, "m/s", True), ("-", None, "", True), ("1", None, "", True), ("-", None, "m/s", False),
+        ("Nm", None, "N.m", True), ("N*m", None, "N.m", True), ("furlong", {"m": "1", "s": "-1"}, "m/s", True),
+        ("deg/s", {"s": "-1", "rad": "1", "factor": "0.0174"}, "rad/s", False), ("Hz", {"s": "-1"}, "rad/s", True),
+        ("kN", {"kg": "1", "m": "1", "s": "-2", "factor": "1000"}, "N", False),
+        ("degC", {"K": "1", "offset": "273.15"}, "m", False), ("m", {"m": "1", "offset": "1"}, "m/s", False),
+        ("one", {"kg": "0"}, "", True), ("percent", {"factor": "0.01"}, "", False), ("m/s", {"K": "1"}, "m/s", True),
+    ],
+)  # fmt: skip
+def test_base_units_are_compared(unit, factors, expected, fits):
+    """By the definition of a unit, unless its name is the expected one; without a unit anything fits."""
+    file = SimpleNamespace(units={} if factors is None else {unit: factors}, path=Path("it.fmu"))
+    variable = SimpleNamespace(name="x", unit=unit)
+    with contextlib.nullcontext() if fits else pytest.raises(ScenarioError, match=f"x of it.fmu is in '{unit}'"):
+        require_unit("law.inputs.x", file, variable, expected)
+
+
 def test_units_are_compared(tmp_path):
     units = {"velocity.u": "km/h"}
     path = build_foreign_fmu(tmp_path / "it.fmu", 3, inputs=VELOCITY, outputs=WRENCH, units=tuple(units.items()))
@@ -153,7 +178,8 @@ def test_check_compares_the_period_with_the_steps_of_the_fmu(fmus, tmp_path):
     [
         ("error", "t = 1 s: "), ("fatal", "t = 1 s: out of memory"), ("discard", "t = 1.005 s: the FMU discarded"),
         ("end", "t = 1.005 s: the FMU requests the end"), ("nan", "t = 1 s: wrench.X is nan, expected a finite force"),
-        ("null message", "t = 1 s: the FMU failed without a message"),
+        ("null message", "t = 1 s: the FMU failed without a message: Error"),
+        ("no input", "t = 1 s: the FMU failed without a message: Discard"),
     ],
 )  # fmt: skip
 def test_failures_name_fmu_and_time_and_keep_the_record(fmus, fmi, tmp_path, mode, words):
@@ -163,6 +189,12 @@ def test_failures_name_fmu_and_time_and_keep_the_record(fmus, fmi, tmp_path, mod
     run = load_run(tmp_path / "run")
     assert run.summary["status"] == f"failed: {caught.value}"
     assert run.record["time"][-1] == pytest.approx(0.99)
+
+
+def test_parts_of_steps_are_failures(fmus, tmp_path):
+    """FMI 2.0 does not say how far a step went that succeeded."""
+    with pytest.raises(PlantError, match=r"brake3\.fmu: t = 1\.005 s: the FMU made a part of the step alone"):
+        kept_rows(braked(fmus, 3, mode="short"))
 
 
 def test_failed_rows_are_refused_and_others_fly(fmus, fmi):
@@ -175,17 +207,50 @@ def test_failed_rows_are_refused_and_others_fly(fmus, fmi):
         assert flown.outcomes[0].tobytes() == flown.outcomes[2].tobytes()
 
 
+def hanging_run(fmus, folder, timeout, *options, at):
+    """Start a run of an FMU that hangs from a time on [s], as a terminal does: in a group of processes of its own."""
+    scenario = braked(fmus, 3, "time.duration=100", "time.step=0.001", mode="hang", at=at)
+    (folder / "it.toml").write_bytes(files_of(scenario)["scenario.toml"])
+    shutil.copy(fmus / "brake3.fmu", folder)
+    call = [sys.executable, "-m", "cosim", "run", "it.toml", "--set", f"law.timeout={timeout}", "--out", "run"]
+    posix = {"start_new_session": True} if os.name == "posix" else {}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen([*call, *options], cwd=folder, text=True, **pipes, **posix)
+
+
+def wait_for_hang(process):
+    """Return once a process has used so much of its processor that its FMU hangs."""
+    used = 0
+    while used < 5 * os.sysconf("SC_CLK_TCK"):
+        time.sleep(0.1)
+        used = int(Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11])
+
+
 @pytest.mark.medium
 def test_hang_ends_the_process_and_keeps_the_record(fmus, tmp_path):
-    scenario = braked(fmus, 3, "time.duration=100", "time.step=0.001", mode="hang", at=90.0)
-    (tmp_path / "it.toml").write_bytes(files_of(scenario)["scenario.toml"])
-    shutil.copy(fmus / "brake3.fmu", tmp_path)
-    call = [sys.executable, "-m", "cosim", "run", "it.toml", "--set", "law.timeout=1.0", "--out", "run", "--rate", "20"]
-    done = subprocess.run(call, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode != 0
-    assert "brake3.fmu: t = 90 s: doStep has not returned for 1 s" in done.stderr
+    with hanging_run(fmus, tmp_path, 1.0, "--rate", "20", at=90.0) as process:
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode != 0
+    assert "brake3.fmu: t = 90 s: doStep has not returned for 1 s" in errors
     run = load_run(tmp_path / "run")
     assert run.summary["status"] == "killed" and run.record["time"][-1] > 10.0
+
+
+@pytest.mark.medium
+@pytest.mark.skipif(sys.platform != "linux", reason="signals of a terminal, and /proc")
+def test_stopped_runs_are_kept_and_interrupted_hangs_end(fmus, tmp_path):
+    """As by Ctrl-Z, fg and Ctrl-C in a terminal, and a debugger's stop of one process."""
+    with hanging_run(fmus, tmp_path, 30.0, at=0.5) as process:
+        wait_for_hang(process)
+        for stop in (os.killpg, os.kill):
+            stop(process.pid, signal.SIGSTOP)
+            time.sleep(1.5)
+            stop(process.pid, signal.SIGCONT)
+        assert process.poll() is None
+        os.killpg(process.pid, signal.SIGINT)
+        _, errors = process.communicate(timeout=20)
+    assert process.returncode != 0 and errors.count("\n") == 1
+    assert "t = 0.5 s: the run was interrupted, and doStep has not returned" in errors
 
 
 def test_run_folder_repeats_the_run(fmus, fmi, tmp_path):
@@ -216,6 +281,10 @@ def test_default_law_replaces_an_fmu(fmus, tmp_path):
     for scenario in (changed, load_scenario(tmp_path / "child.toml")):
         assert scenario.law.fmu is None and scenario.law.name == "ismail_dunnigan"
     assert load_scenario(tmp_path / "mine.toml", ["law.name=brake3.fmu"]).law.fmu is not None
+    (tmp_path / "none.toml").write_text('base = "mine.toml"\nlaw = { file = "" }\n')
+    for scenario in (load_scenario(tmp_path / "mine.toml", ["law.file="]), load_scenario(tmp_path / "none.toml")):
+        assert scenario.law.fmu is None and scenario.law.name == "ismail_dunnigan"
+    assert load_scenario("paper", ["law.name=pd", "law.file="]).law.name == "pd"
 
 
 def test_commands_steer_beside_the_fmu(fmus):
@@ -229,6 +298,19 @@ def test_commands_steer_beside_the_fmu(fmus):
             master.step(k, queue)
             if k in (19, 30, 59):
                 assert (np.abs(master.row[master.signals.index("wrench.Z")]) > 0.0) == (k != 30)
+
+
+def test_errors_name_the_time_of_the_run(fmus, fmi):
+    """Also after the FMU began again."""
+    scenario = braked(fmus, fmi, "commands.enabled=true", mode="error", at=0.3)
+    queue = CommandQueue()
+    with Master(scenario) as master:
+        for k in range(50):
+            if k in (10, 20):
+                queue.submit(cmd.Arm(k == 20))
+            master.step(k, queue)
+        with pytest.raises(PlantError, match=r"fmu: t = 0\.5 s: "):
+            master.step(50, queue)
 
 
 def test_forces_that_no_output_sets_are_zero(tmp_path):
