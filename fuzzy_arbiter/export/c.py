@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from functools import partial
+from collections.abc import Iterable, Iterator
 from importlib.resources import files
 
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.export.code_functions import in_c
 from fuzzy_arbiter.export.heights import ENDS, NODES, WEIGHTS
-from fuzzy_arbiter.export.program import TABLES, Program, program
-from fuzzy_arbiter.export.statements import FUNCTIONS, Assign, Return, Statement, Sweep, expressions, format_statements
+from fuzzy_arbiter.export.program import TABLES, Heights, Program, Sweep, program
+
+_BRANCH = re.compile(r"(if|elif|else) ?(.*):")
 
 
 def to_c(system: System) -> str:
@@ -54,59 +54,52 @@ def _file(code: Program) -> Iterator[str]:
     yield " */"
     n, m = len(system.inputs), len(system.outputs)
     signature = f"int {function}(const double inputs[{n}], double outputs[{m}])"
-    yield f"{signature};"
-    known = {f"x{i}" for i in range(1, n + 1)}
-    text = "\n".join(format_statements(code.statements, lambda statement: _simple(statement, known), _branch, "}"))
-    yield ""
+    yield f"{signature};\n"
     yield from (["#include <math.h>", ""] if code.mathematical else [])
     yield from filter(None, map(in_c, code.functions))
-    if any(code.outlines):
-        for k, shape in enumerate(code.outlines, 1):
-            if shape is None:
-                continue
-            name = _safe(system.outputs[k - 1].name)
+    yield from _library(code)
+    for k, one in code.defuzzifiers.items():
+        name = _safe(system.outputs[k - 1].name)
+        if isinstance(one, Sweep):
             yield f"\n/* knots of the terms of {name}, and degrees right and left of them */"
-            for table, side in zip(TABLES, shape, strict=True):
+            for table, values in zip(TABLES, one.outline, strict=True):
                 kind = "int" if table in ("FIRST", "TERM", "ORDER") else "double"
-                yield f"static const {kind} {table}_{k}[] = {{{', '.join(map(repr, side))}}};"
-        terms = max(len(output.terms) for output in system.outputs)
-        if "centroid_of_scaled(" in text:
-            yield f"\n#define TERMS {terms} /* the most of any output */"
-        for name in ("clip", "scale"):
-            if f"centroid_of_{name}" in text:
-                yield (files("fuzzy_arbiter.export") / f"{name}.c").read_text().rstrip()
-    if any(code.heights):
-        source = (files("fuzzy_arbiter.export") / "heights.c").read_text().rstrip()
+                yield f"static const {kind} {table}_{k}[] = {{{', '.join(map(repr, values))}}};"
+            tables = f"{len(one.outline.breakpoints) - 1}, {', '.join(f'{table}_{k}' for table in TABLES)}"
+            result = f"return centroid_of_{one.method}(cuts, {one.count}, {tables})"
+            yield from _function(f"static double sweep_{k}(const double *cuts)", [result], set())
+        else:
+            yield f"\nstatic const double EDGES_{k}[] = {{{', '.join(map(repr, one.edges))}}};"
+            lines = ("(void)x", *one.lines)  # constant terms do not use it
+            yield from _function(f"static double height_{k}(double x, const double *cuts)", lines, {"x"})
+    yield "\n/* Fills the outputs and returns 0. Else it leaves them as they are, and returns"
+    for i, variable in enumerate(system.inputs, 1):
+        yield f" * {-i:3}  {_safe(variable.name)} is not in its universe, or no number"
+    for k, output in enumerate(system.outputs, 1):
+        if output.default is None:
+            yield f" * {k:3}  no rule fires for {_safe(output.name)}, which has no default"
+    yield " */"
+    yield from _function(signature, code.lines, set())
+
+
+def _library(code: Program) -> Iterator[str]:
+    """Yield the functions in C that the defuzzifiers call."""
+    system, all_of = code.system, code.defuzzifiers.values()
+    methods = {one.method for one in all_of if isinstance(one, Sweep)}
+    if "scaled" in methods:
+        yield f"\n#define TERMS {max(len(output.terms) for output in system.outputs)} /* the most of any output */"
+    for method, name in (("clipped", "clip"), ("scaled", "scale")):
+        if method in methods:
+            yield _source(name)
+    if panels := [len(one.edges) for one in all_of if isinstance(one, Heights)]:
+        source = _source("heights").replace("PANELS", str(max(panels)))
         for word, numbers in (("NODES", NODES), ("WEIGHTS", WEIGHTS), ("ENDS", ENDS)):
             source = source.replace(word, ", ".join(map(repr, numbers)))
-        source = source.replace("PANELS", str(max(len(one.edges) for one in code.heights if one)))
         yield source
-    for k, one in enumerate(code.heights, 1):
-        if one is not None:
-            yield f"\nstatic const double EDGES_{k}[] = {{{', '.join(map(repr, one.edges))}}};\n"
-            yield f"static double height_{k}(double x, const double *cuts)\n{{"
-            known = {"x"}
-            if not any(re.search(r"\bx\b", text) for text in expressions(one.statements)):
-                yield "    (void)x;"
-            yield from format_statements(one.statements, partial(_simple, known=known), _branch, "}")
-            yield "}"
-    yield "\n/* Fills the outputs and returns 0. Else it leaves them as they are, and returns"
-    yield from (
-        f" * {-i:3}  {_safe(v.name)} is not in its universe, or no number" for i, v in enumerate(system.inputs, 1)
-    )
-    yield from (
-        f" * {k:3}  no rule fires for {_safe(v.name)}, which has no default"
-        for k, v in enumerate(system.outputs, 1)
-        if v.default is None
-    )
-    yield " */"
-    yield signature
-    yield "{"
-    yield from (f"    double x{i} = inputs[{i - 1}]; /* {_safe(v.name)} */" for i, v in enumerate(system.inputs, 1))
-    yield text
-    yield from (f"    outputs[{k - 1}] = y{k};" for k in range(1, m + 1))
-    yield "    return 0;"
-    yield "}"
+
+
+def _source(name: str) -> str:
+    return (files("fuzzy_arbiter.export") / f"{name}.c").read_text().rstrip()
 
 
 def _safe(words: str) -> str:
@@ -114,26 +107,29 @@ def _safe(words: str) -> str:
     return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", words)
 
 
-def _simple(statement: Statement, known: set[str]) -> Iterator[str]:
-    match statement:
-        case Assign(name, expression, words):
-            kind = "" if name in known else "double "
-            known.add(name)
-            yield f"{kind}{name} = {expression};" + (f" /* {_safe(words)} */" if words else "")
-        case Sweep(name, k, cuts, method):
-            yield f"const double cuts_{k}[] = {{{', '.join(cuts)}}};"
-            if method not in ("clipped", "scaled"):
-                function, side = FUNCTIONS[method]
-                panels = f"sizeof EDGES_{k} / sizeof *EDGES_{k} - 1"
-                yield f"{name} = {function}(height_{k}, cuts_{k}, EDGES_{k}, {panels}, {side});"
-                return
-            pieces = f"sizeof BREAKPOINTS_{k} / sizeof *BREAKPOINTS_{k} - 1"
-            tables = f"{pieces}, {', '.join(f'{table}_{k}' for table in TABLES)}"
-            yield f"{name} = centroid_of_{method}(cuts_{k}, {len(cuts)}, {tables});"
-        case Return(status):
-            yield f"return {status};"
+def _function(signature: str, lines: Iterable[str], names: set[str]) -> Iterator[str]:
+    """Write a function whose body is lines of Python; other names than these are declared where they are assigned."""
+    yield f"{signature}\n{{"
+    depth = 0
+    for line in (*lines, ""):
+        text, _, words = line.lstrip().partition("  # ")
+        level, branch = (len(line) - len(line.lstrip())) // 4, _BRANCH.fullmatch(text)
+        continues = branch is not None and branch[1] != "if"
+        for ended in range(depth - 1, level - 1 + continues, -1):
+            yield f"{'    ' * (ended + 1)}}}"
+        depth = level + (branch is not None)
+        if text:
+            yield f"{'    ' * (level + 1)}{_statement(text, branch, names)}{f' /* {_safe(words)} */' if words else ''}"
+    yield "}"
 
 
-def _branch(i: int, condition: str) -> str:
-    condition = condition.replace("not (", "!(").replace(" and ", " && ").replace(" or ", " || ")
-    return f"{'} else ' if i else ''}{f'if ({condition}) ' if condition else ''}{{"
+def _statement(text: str, branch: re.Match[str] | None, names: set[str]) -> str:
+    if branch:
+        condition = branch[2].replace("not (", "!(").replace(" and ", " && ").replace(" or ", " || ")
+        return {"if": f"if ({condition}) {{", "elif": f"}} else if ({condition}) {{"}.get(branch[1], "} else {")
+    name, _, value = text.partition(" = ")
+    if value.endswith(",)"):
+        return f"const double {name}[] = {{{value[1:-2]}}};"
+    is_new = value and name.isidentifier() and name not in names
+    names.add(name)
+    return f"{'double ' if is_new else ''}{text};"

@@ -1,4 +1,4 @@
-"""Defuzzify a height function; `export` copies this source into its code."""
+"""Defuzzify a height function over n panels; `export` copies this source into its code."""
 
 # The height is smooth between the edges of panels but for where terms meet their cuts and each other. A panel is halved
 # until the integral over it is that over its halves.
@@ -37,14 +37,13 @@ def integrate(
 
 
 def integrate_panels(
-    height: Height, cuts: Sequence[float], edges: Sequence[float], tolerance: float, total: float
+    height: Height, cuts: Sequence[float], edges: Sequence[float], n: int, tolerance: float, total: float
 ) -> tuple[float, float, float]:
     """Return the area, its moment about the start, and the position that halves a total area, of several the middle."""
     area = 0.0
     moment = 0.0
     halvings = 0
     start = edges[0]
-    n = len(edges) - 1
     positions = [edges[n]] * 2  # the first and the last one that halve the total
     ends = [edges[n]] * (n + 60)  # of panels, the next one last
     for k in range(n):
@@ -84,15 +83,15 @@ def integrate_panels(
     return area, moment, (positions[0] + positions[1]) / 2
 
 
-def center_of_area(height: Height, cuts: Sequence[float], edges: Sequence[float], is_bisector: int) -> float:
+def center_of_area(height: Height, cuts: Sequence[float], edges: Sequence[float], n: int, is_bisector: int) -> float:
     """Return the centroid, or the position that halves the area, of several the middle one; NaN where there is none."""
-    tolerance = 1e-13 * integrate_panels(height, cuts, edges, 1e300, 1e300)[0]
-    area, moment, _ = integrate_panels(height, cuts, edges, tolerance, 1e300)
+    tolerance = 1e-13 * integrate_panels(height, cuts, edges, n, 1e300, 1e300)[0]
+    area, moment, _ = integrate_panels(height, cuts, edges, n, tolerance, 1e300)
     if not area > 0.0:
         return NAN
     if is_bisector:
-        return integrate_panels(height, cuts, edges, tolerance, area)[2]
-    return min(max(edges[0] + moment / area, edges[0]), edges[len(edges) - 1])
+        return integrate_panels(height, cuts, edges, n, tolerance, area)[2]
+    return min(max(edges[0] + moment / area, edges[0]), edges[n])
 
 
 def find_maximum(height: Height, cuts: Sequence[float], start: float, end: float) -> float:
@@ -128,9 +127,8 @@ def plateau_end(height: Height, cuts: Sequence[float], top: float, x: float, out
     return inside if height((x + inside) / 2, cuts) >= top * (1.0 - 1e-13) else x
 
 
-def position_of_maximum(height: Height, cuts: Sequence[float], edges: Sequence[float], side: int) -> float:
+def position_of_maximum(height: Height, cuts: Sequence[float], edges: Sequence[float], n: int, side: int) -> float:
     """Return the smallest (side -1), mean (0) or largest (1) position [-] of the maximum height; NaN if that is 0."""
-    n = len(edges) - 1
     width = edges[n] - edges[0]
     top = 0.0
     tops = [edges[0]] * n

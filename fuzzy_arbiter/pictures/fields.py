@@ -9,8 +9,8 @@ import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.pictures.places import fixed_inputs, format_values, index_of, output_index, weights_at
-from fuzzy_arbiter.pictures.style import INK, color, hatch, new_axes, require_matplotlib, room, wrapped
+from fuzzy_arbiter.pictures.sampling import output_index, weights_over
+from fuzzy_arbiter.pictures.style import INK, color, hatch, new_axes, require_matplotlib, title_width, wrapped
 from fuzzy_arbiter.shapes import Array
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 _TIE = 1e-9  # weights closer than this are equal
 _UNDEFINED = "#d9d9d9"
 _SHADES = 5  # number of shades of the margin
+_FRACTIONS = np.linspace(0.2, 0.85, _SHADES)  # of the output's color in each shade
 
 
 def surface(
@@ -55,12 +56,12 @@ def surface(
     'obstacle'
     """
     k = output_index(arbiter.system, output)
-    x, y, weights, note = _field(arbiter, over, at, points)
+    x, y, weights, title = _field(arbiter, over, at, points, output)
     z = np.ma.masked_invalid(weights[..., k])
     relief = ax is not None and ax.name == "3d"
     ax = new_axes(5.6, 4.4) if ax is None else ax
     if relief:
-        _relief(ax, x, y, weights[..., k], over, output)
+        _relief(ax, x, y, weights[..., k], (*over, output))
     elif z.count() == 0 or z.max() - z.min() < _TIE * max(1.0, abs(z).max()):
         ax.contourf(x, y, np.ma.getmaskarray(z).astype(float), levels=[-0.5, 0.5], colors=["#eeeeee"])
         value = "undefined" if z.count() == 0 else f"{output} = {z.max():.4g}"
@@ -76,7 +77,7 @@ def surface(
         bar.outline.set_visible(False)
     if not relief:
         ax.set(xlabel=over[0], ylabel=over[1])
-    ax.set_title(wrapped(f"{output}{note}", room(ax)), fontsize=10, loc="left")
+    ax.set_title(wrapped(title, title_width(ax)), fontsize=10, loc="left")
     return ax
 
 
@@ -120,7 +121,7 @@ def decisions(
         raise DefinitionError(
             f"decisions: the only output is {outputs[0].name!r}, expected two or more to decide between"
         )
-    x, y, weights, note = _field(arbiter, over, at, points)
+    x, y, weights, title = _field(arbiter, over, at, points, "what decides")
     ax = new_axes(5.8, 4.4) if ax is None else ax
     undefined = np.asarray(np.isnan(weights).any(axis=-1))
     ranked_weights = np.where(undefined[..., None], 0.0, weights)
@@ -137,7 +138,8 @@ def decisions(
         ahead = np.ma.masked_where(undefined, ranked_weights[..., k] - others)
         if ahead.count() == 0 or not ahead.max() > levels[0]:
             continue
-        shades = [_mixed(to_rgb(color(k)), fraction) for fraction in np.linspace(0.2, 0.85, _SHADES)]
+        # mixed with white
+        shades = [tuple(1.0 - fraction * (1.0 - part) for part in to_rgb(color(k))) for fraction in _FRACTIONS]
         ax.contourf(x, y, ahead, levels=levels, colors=shades)
         hatching = ax.contourf(x, y, ahead, levels=levels[[0, -1]], colors="none", hatches=[hatch(k)])
         hatching.set(edgecolor=(1.0, 1.0, 1.0, 0.55), linewidth=0.0)
@@ -156,38 +158,27 @@ def decisions(
         labelspacing=0.8,
     )  # fmt: skip
     ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel=over[0], ylabel=over[1])
-    ax.set_title(wrapped(f"what decides{note}", room(ax)), fontsize=10, loc="left")
+    ax.set_title(wrapped(title, title_width(ax)), fontsize=10, loc="left")
     return ax
 
 
-def _mixed(whole: tuple[float, float, float], fraction: float) -> str:
-    """Return a color mixed with white."""
-    from matplotlib.colors import to_hex
-
-    red, green, blue = (1.0 - fraction * (1.0 - part) for part in whole)
-    return to_hex((red, green, blue))
-
-
 def _field(
-    arbiter: Arbiter, over: tuple[str, str], at: Mapping[str, float] | None, points: int
+    arbiter: Arbiter, over: tuple[str, str], at: Mapping[str, float] | None, points: int, title: str
 ) -> tuple[Array, Array, Array, str]:
-    """Return positions along both axes, weights over them (rows along the second), and fixed inputs in words."""
+    """Return positions along both axes, weights over them (rows along the second), and the picture's title."""
     if isinstance(over, str) or len(over) != 2:
         raise DefinitionError(f"over is {over!r}, expected the names of two inputs")
-    fixed = fixed_inputs(arbiter, over, at)
-    inputs = arbiter.system.inputs
-    x, y = (np.linspace(*inputs[index_of(inputs, name, "input")].universe, points) for name in over)
-    across, along = np.meshgrid(x, y)
-    weights = weights_at(arbiter, fixed, {over[0]: across.ravel(), over[1]: along.ravel()})
-    return x, y, weights.reshape(points, points, -1), f"  (at {format_values(fixed)})" if fixed else ""
+    (x, y), weights, note = weights_over(arbiter, over, at, lambda v: np.linspace(*v.universe, points))
+    return x, y, weights, f"{title}  ({note})" if note else title
 
 
-def _relief(ax: Any, x: Array, y: Array, z: Array, over: tuple[str, str], output: str) -> None:
+def _relief(ax: Any, x: Array, y: Array, z: Array, names: tuple[str, str, str]) -> None:
     across, along = np.meshgrid(x, y)
     every = max(1, len(x) // 30)
     ax.plot_surface(across, along, z, rstride=every, cstride=every, cmap="cividis", edgecolor="white", linewidth=0.2)
-    xlabel, ylabel, zlabel = (wrapped(name, 20) for name in (*over, output))
-    ax.set(xlabel=xlabel, ylabel=ylabel, zlabel=zlabel)
-    ax.xaxis.labelpad, ax.yaxis.labelpad = (4.0 + 10.0 * label.count("\n") for label in (xlabel, ylabel))
+    for axis, name in zip((ax.xaxis, ax.yaxis, ax.zaxis), names, strict=True):
+        label = wrapped(name, 20)
+        axis.set_label_text(label)
+        axis.labelpad = 4.0 + 10.0 * label.count("\n")
     ax.set_box_aspect(None, zoom=0.8)  # the layout ignores labels in three dimensions
     ax.locator_params(nbins=6)

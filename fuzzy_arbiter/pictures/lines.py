@@ -11,14 +11,8 @@ import numpy as np
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import Output, System, Variable, variable_names
 from fuzzy_arbiter.errors import InputError, UnsupportedError
-from fuzzy_arbiter.pictures.places import fixed_inputs, format_values, index_of, points_along, weights_at
-from fuzzy_arbiter.pictures.style import (
-    FAINT,
-    legend_above,
-    line_style,
-    new_axes,
-    tidy,
-)
+from fuzzy_arbiter.pictures.sampling import points_along, weights_over
+from fuzzy_arbiter.pictures.style import FAINT, legend_above, line_style, new_axes, tidy
 from fuzzy_arbiter.shapes import Shape
 from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Value
@@ -37,7 +31,7 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
     variable : str
         Name of an input or an output.
     at : float, optional
-        Place at which the terms' degrees are marked.
+        Position at which the terms' degrees are marked.
     ax : Axes, optional
         Axes to draw into; default: those of a new figure.
 
@@ -62,8 +56,7 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
     >>> terms(Arbiter(), "obstacle").get_ylabel()
     'degree'
     """
-    variables = (*arbiter.system.inputs, *arbiter.system.outputs)
-    selected = variables[index_of(variables, variable, "variable")]
+    selected = arbiter.system[variable]
     low, high = selected.universe
     if at is not None and not low <= at <= high:
         raise InputError(f"{variable}: position is {at!r}, expected a number in [{low:g}, {high:g}]")
@@ -90,16 +83,18 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
 
 
 def value_spans(system: System, variable: Variable) -> dict[str, tuple[float, float]]:
-    """Return the least and the greatest value of each term that is a value, over samples of the inputs."""
+    """Return the minimum and the maximum of each term that is a value, over samples of the inputs."""
+    if not (isinstance(variable, Output) and variable.weighted):
+        return {}
     corners = itertools.islice(itertools.product(*(v.universe for v in system.inputs)), 1024)
     low, high = np.array([v.universe for v in system.inputs]).T
     samples = np.array([*corners, *np.random.default_rng(0).uniform(low, high, (1024, len(low)))]).T
-    names, spans = variable_names(system.inputs), {}
-    for term in variable.terms if isinstance(variable, Output) and variable.weighted else ():
+    inputs, outputs = variable_names(system.inputs), variable_names(system.outputs)
+    known = dict(zip(inputs, samples, strict=True)) | dict.fromkeys(outputs, np.nan)
+    spans = {}
+    for term in variable.terms:
         if isinstance(term.shape, Value):
-            whole = term.shape.expression(names, variable_names(system.outputs))
-            known = dict(zip(names, samples, strict=True)) | dict.fromkeys(variable_names(system.outputs), np.nan)
-            values = np.broadcast_to(whole.of_many(known), samples.shape[1:])
+            values = np.ravel(term.shape.expression(inputs, outputs).of_many(known))
             values = values[np.isfinite(values)]
             spans[term.name] = (float(values.min()), float(values.max())) if values.size else variable.universe
     return spans
@@ -155,17 +150,13 @@ def profile(
     'obstacle'
     """
     system = arbiter.system
-    fixed = fixed_inputs(arbiter, (over,), at)
-    variable = system.inputs[index_of(system.inputs, over, "input")]
-    low, high = variable.universe
-    x = points_along(variable, 301)
-    weights = weights_at(arbiter, fixed, {over: x})
+    (x,), weights, note = weights_over(arbiter, (over,), at, lambda variable: points_along(variable, 301))
     ax = new_axes(6.0, 3.2) if ax is None else ax
     for k, name in enumerate(system.result_names):
         ax.plot(x, weights[:, k], label=name, clip_on=False, **line_style(k))
-    ax.set(xlim=(low, high), xlabel=over, ylabel="weight" if system.weights_of else "value")
+    ax.set(xlim=system[over].universe, xlabel=over, ylabel="weight" if system.weights_of else "value")
     if system.normalization != "none":
         ax.set_ylim(0.0, 1.0)
     tidy(ax)
-    legend_above(ax, system.result_names, f"at {format_values(fixed)}" if fixed else "")
+    legend_above(ax, system.result_names, note)
     return ax

@@ -60,30 +60,15 @@ def tidy(ax: Axes) -> None:
 
 def legend_above(ax: Axes, names: Sequence[str], title: str = "") -> None:
     """Set the legend above the axes, where it covers nothing, in as many columns as fit."""
+    width = title_width(ax)
     ax.legend(
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        frameon=False,
-        borderaxespad=0.2,
-        borderpad=0.1,
-        title_fontsize=10,
-        **legend_style(names, title, room(ax)),
-    )
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), frameon=False, borderaxespad=0.2, borderpad=0.1, handlelength=3.2,
+        ncols=max(1, min(len(names), width // (max(map(len, names)) + 8))), fontsize=9,
+        title=wrapped(title, width) or None, title_fontsize=10, alignment="left",
+    )  # fmt: skip
 
 
-def legend_style(names: Sequence[str], title: str, letters: int) -> dict[str, Any]:
-    """Return the layout of a legend that is at most a number of letters wide."""
-    columns = max(1, min(len(names), letters // (max(map(len, names)) + 8)))
-    return {
-        "ncols": columns,
-        "title": wrapped(title, letters) or None,
-        "alignment": "left",
-        "handlelength": 3.2,
-        "fontsize": 9,
-    }
-
-
-def room(ax: Axes) -> int:
+def title_width(ax: Axes) -> int:
     """Return the number of letters that fit in a line above some axes."""
     return max(20, int(_LETTERS * ax.bbox.width / ax.figure.dpi))
 
