@@ -8,17 +8,16 @@ import json
 import os
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 try:
     from fuzzy_arbiter.arbiter import Arbiter
-    from fuzzy_arbiter.command_line.definitions import BUILT_IN, convert, described, load_system, require_suffix
+    from fuzzy_arbiter.command_line.definitions import BUILT_IN, convert, describe, load_system, require_suffix
     from fuzzy_arbiter.command_line.drawing import IMAGES, PICTURES, draw, image, middles
-    from fuzzy_arbiter.command_line.evaluation import evaluated, evaluated_table, sample
+    from fuzzy_arbiter.command_line.evaluation import evaluate, evaluate_table, parse_sample
     from fuzzy_arbiter.engines import ENGINES
     from fuzzy_arbiter.errors import ArbiterError, InputError, one_line
-    from fuzzy_arbiter.explanation import Explanation
     from fuzzy_arbiter.files import write_atomic
 except ModuleNotFoundError as error:  # in a checkout that is not installed
     print(f"fuzzy_arbiter: {error.name} is not installed, expected what pyproject.toml requires", file=sys.stderr)
@@ -40,20 +39,6 @@ examples:
 """
 
 
-class _Version(argparse.Action):
-    """Print the version, which takes a while to find."""
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        from importlib import metadata
-
-        try:
-            version = metadata.version("fuzzy-arbiter")
-        except metadata.PackageNotFoundError:
-            version = "of a folder that is not installed"
-        print(f"fuzzy_arbiter {version}")
-        parser.exit()
-
-
 class _Parser(argparse.ArgumentParser):
     """Report a wrong option in one line, as all other errors."""
 
@@ -73,40 +58,41 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
+    parser.add_argument("--version", action="version", version=f"fuzzy_arbiter {_version()}")
     verbs = parser.add_subparsers(dest="verb", required=True)
 
-    def verb(name: str, what: str, *, engine: bool = True, values: bool = False, as_json: bool = False) -> Any:
+    def verb(run: Callable[[argparse.Namespace], int | None], what: str, *options: str) -> Any:
+        name = run.__name__.removeprefix("_")
         added = verbs.add_parser(name, help=what, description=f"{what[0].upper()}{what[1:]}.")
+        added.set_defaults(run=run)
         added.add_argument("file", metavar="FILE", help=f"a definition, or {BUILT_IN}")
         added.add_argument("--block", metavar="NAME", help="which FUNCTION_BLOCK of a FCL file that has several")
-        if engine:
+        if "engine" in options:
             known = f"{', '.join(ENGINES)} (default: %(default)s)"
             added.add_argument("--engine", choices=ENGINES, default="auto", metavar="NAME", help=known)
-        if values:
+        if "values" in options:
             help = "name=value for each input, or values in their order"
             added.add_argument("values", nargs="*", metavar="VALUE", help=help)
-        if as_json:
+        if "json" in options:
             added.add_argument("--json", action="store_true", help="JSON in the place of text")
-        return added
+        return added.add_argument
 
-    verb("show", "variables, terms, rules, norms, and which engine evaluates them")
-    what = "outputs for one sample, or for each row of a table"
-    add = verb("eval", what, values=True, as_json=True).add_argument
+    verb(_show, "variables, terms, rules, norms, and which engine evaluates them", "engine")
+    add = verb(_eval, "outputs for one sample, or for each row of a table", "engine", "values", "json")
     table = "table whose first line names the inputs, - for standard input; others are ignored"
     add("--csv", metavar="FILE", help=table)
     add("--out", metavar="FILE", help="file to write (default: standard output)")
-    verb("explain", "which rules fire for a sample, how strongly, and which decide", values=True, as_json=True)
-    what = "whether the rules leave no gap; exit status 1 if they do"
-    add = verb("verify", what, engine=False, as_json=True).add_argument
+    verb(_explain, "which rules fire for a sample, how strongly, and which decide", "engine", "values", "json")
+    add = verb(_verify, "whether the rules leave no gap; exit status 1 if they do", "json")
     add("--as-criteria", action="store_true", default=None, help="check also that no two rules contradict each other")
 
-    add = verb("convert", "write a definition in another format, or as source code", engine=False).add_argument
+    add = verb(_convert, "write a definition in another format, or as source code")
     add("out", metavar="OUT", help=".json, .toml, .fcl, .fis, .fll, or .c, .py for code that evaluates it")
     add("--native", action="store_true", help="fold the normalization of criteria into the universe")
 
-    what = "draw terms, rules at a sample, outputs over inputs, or which output is the greatest where"
-    add = verb("plot", what).add_argument
+    add = verb(
+        _plot, "draw terms, rules at a sample, outputs over inputs, or which output is the greatest where", "engine"
+    )
     add("kind", choices=PICTURES, metavar="PICTURE", help=", ".join(PICTURES))
     along = "along which; given twice for surface and decisions (default: the first; for terms all)"
     add("--input", action="append", default=[], metavar="NAME", help=along)
@@ -116,38 +102,50 @@ def _parser() -> argparse.ArgumentParser:
     add("--relief", action="store_true", help="surface in three dimensions")
     add("--out", required=True, metavar="FILE", help=".png, .svg or .pdf")
 
-    verb("bench", "time every engine on this definition, in a few seconds", engine=False)
+    verb(_bench, "time every engine on this definition, in a few seconds")
     return parser
+
+
+def _version() -> str:
+    from importlib import metadata
+
+    try:
+        return metadata.version("fuzzy-arbiter")
+    except metadata.PackageNotFoundError:
+        return "of a folder that is not installed"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line."""
     if sys.stdout is None:  # closed by the parent process: the next file that is opened would take its place
-        return _fault("standard output is closed; expected it open, such as on /dev/null")
+        print_error("standard output is closed; expected it open, such as on /dev/null")
+        return FAULT
     try:
         try:
             with warnings.catch_warnings():
-                warnings.showwarning = lambda message, *_: _report(str(message))
-                return _run(_parsed(arguments))
+                warnings.showwarning = lambda message, *_: print_error(str(message))
+                options = parse(arguments)
+                return options.run(options) or 0
         finally:
             sys.stdout.flush()
     except BrokenPipeError:
-        _drop_output()
+        _discard_output()
         return NO_READER
     except ArbiterError as error:
-        return _fault(str(error))
+        print_error(str(error))
     except ImportError as error:
-        return _fault(f"{error.name} is not installed")
+        print_error(f"{error.name} is not installed")
     except OSError as error:  # for example a full disk behind the output
-        _drop_output()
-        return _fault(f"{error.filename or 'standard output'}: {error.strerror or error}")
+        _discard_output()
+        print_error(f"{error.filename or 'standard output'}: {error.strerror or error}")
     except KeyboardInterrupt:
-        _fault("interrupted")
+        print_error("interrupted")
         return INTERRUPTED
+    return FAULT
 
 
-def _parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
-    """Parse, and allow negative numbers and values after options."""
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Parse the arguments, and allow negative numbers and values after options."""
     parser = _parser()
     options, rest = parser.parse_known_args(arguments)
     for word in rest:
@@ -158,74 +156,81 @@ def _parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _is_number(word: str) -> bool:
-    try:
+    with contextlib.suppress(ValueError):
         float(word)
-    except ValueError:
-        return False
-    return True
+        return True
+    return False
 
 
-def _drop_output() -> None:
+def _discard_output() -> None:
     """Redirect standard output to the null device, else the interpreter fails again as it flushes at its end."""
     with contextlib.suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _report(what: str) -> None:
+def print_error(message: str) -> None:
     """Print one line on standard error; nothing where that is closed or gone."""
     if sys.stderr is not None:  # else `print` would take standard output
         with contextlib.suppress(OSError):
-            print(f"fuzzy_arbiter: {one_line(what)}", file=sys.stderr, flush=True)
+            print(f"fuzzy_arbiter: {one_line(message)}", file=sys.stderr, flush=True)
 
 
-def _fault(what: str) -> int:
-    _report(what)
-    return FAULT
+def _arbiter(options: argparse.Namespace) -> Arbiter:
+    return Arbiter(load_system(options.file, options.block), engine=options.engine)
 
 
-def _run(options: argparse.Namespace) -> int:
-    if options.verb == "convert":
-        convert(options.file, options.out, options.native, options.block)
-        print(options.out)
-        return 0
-    suffix = require_suffix(options.out, IMAGES) if options.verb == "plot" else ""
-    system = load_system(options.file, options.block)
-    if options.verb == "bench":
-        from fuzzy_arbiter.command_line.bench import bench
-
-        print(bench(system))
-        return 0
-    arbiter = Arbiter(system, engine=getattr(options, "engine", "auto"))
-    if options.verb in ("verify", "explain"):
-        explains = options.verb == "explain"
-        result = arbiter.explain(sample(options.values, system)) if explains else arbiter.verify(options.as_criteria)
-        print(json.dumps(result.as_dict(), indent=2, ensure_ascii=False) if options.json else result)
-        return 0 if isinstance(result, Explanation) or result.ok else FINDINGS
-    if options.verb == "show":
-        print(described(arbiter))
-    elif options.verb == "plot":
-        assumed = middles(options.at, system) if options.kind == "rules" else []
-        figure = draw(arbiter, options.kind, options.input, options.output, [*options.at, *assumed], options.relief)
-        write_atomic(options.out, image(figure, suffix))
-        if assumed:
-            _report(f"drawn at the middle of each input that --at leaves out: {' '.join(assumed)}")
-        print(options.out)
-    else:
-        _evaluate(arbiter, options)
-    return 0
+def _show(options: argparse.Namespace) -> None:
+    print(describe(_arbiter(options)))
 
 
-def _evaluate(arbiter: Arbiter, options: argparse.Namespace) -> None:
+def _eval(options: argparse.Namespace) -> None:
     if options.csv is not None and options.values:
         raise InputError(f"got {options.values[0]!r} with --csv, expected one of the two")
+    arbiter = _arbiter(options)
     if options.csv is None:
-        text = evaluated(arbiter, sample(options.values, arbiter.system), options.json)
+        text = evaluate(arbiter, parse_sample(options.values, arbiter.system), options.json)
     else:
-        text = evaluated_table(arbiter, options.csv, sys.stdin, options.json)
+        text = evaluate_table(arbiter, options.csv, sys.stdin, options.json)
     if options.out is None:
         print(text)
     else:
         write_atomic(options.out, f"{text}\n".encode())
+
+
+def _explain(options: argparse.Namespace) -> None:
+    arbiter = _arbiter(options)
+    _print(arbiter.explain(parse_sample(options.values, arbiter.system)), options.json)
+
+
+def _verify(options: argparse.Namespace) -> int:
+    report = Arbiter(load_system(options.file, options.block)).verify(options.as_criteria)
+    _print(report, options.json)
+    return 0 if report.ok else FINDINGS
+
+
+def _print(result: Any, as_json: bool) -> None:
+    print(json.dumps(result.as_dict(), indent=2, ensure_ascii=False) if as_json else result)
+
+
+def _convert(options: argparse.Namespace) -> None:
+    convert(options.file, options.out, options.native, options.block)
+    print(options.out)
+
+
+def _plot(options: argparse.Namespace) -> None:
+    suffix, arbiter = require_suffix(options.out, IMAGES), _arbiter(options)
+    assumed = middles(options.at, arbiter.system) if options.kind == "rules" else []
+    figure = draw(arbiter, options.kind, options.input, options.output, [*options.at, *assumed], options.relief)
+    write_atomic(options.out, image(figure, suffix))
+    if assumed:
+        print_error(f"drawn at the middle of each input that --at leaves out: {' '.join(assumed)}")
+    print(options.out)
+
+
+def _bench(options: argparse.Namespace) -> None:
+    from fuzzy_arbiter.command_line.bench import bench
+
+    print(bench(load_system(options.file, options.block)))
 
 
 if __name__ == "__main__":

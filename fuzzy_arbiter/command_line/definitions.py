@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import Output, System, Variable
+from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.files import write_atomic
 from fuzzy_arbiter.hierarchy import prioritized
@@ -35,27 +35,23 @@ def require_suffix(out: str, expected: Sequence[str]) -> str:
     return suffix
 
 
-def described(arbiter: Arbiter) -> str:
-    """Return a system in words: variables, terms, rules, norms, engine."""
+def describe(arbiter: Arbiter) -> str:
+    """Format a system in words: variables, terms, rules, norms, engine."""
     system = arbiter.system
     lines = [system.name, ""]
     for heading, variables in (("inputs", system.inputs), ("outputs", system.outputs)):
-        lines += [heading, *(line for variable in variables for line in _described(variable))]
+        lines.append(heading)
+        for v in variables:
+            low, high = v.universe
+            default = ("no default" if v.default is None else f"default {v.default!r}") if isinstance(v, Output) else ""
+            lines.append(f"  {v.name} in [{low!r}, {high!r}]{', ' if default else ''}{default}")
+            width = max(map(len, v.term_names), default=0)
+            lines += [f"    {term.name:{width}}  {_numbers(term)}" for term in v.terms]
     lines += ["", "rules", *(f"  {line}" for line in str(system).splitlines()), ""]
     norms = ["conjunction", "disjunction", "implication", "outside", "points"]
     norms[3:3] = ["normalization"] if system.normalization != "none" else []
     lines += [f"{name:14} {getattr(system, name)}" for name in norms]
     return "\n".join([*lines, f"{'engine':14} {arbiter.engine}: {arbiter.engine_reason}"])
-
-
-def _described(variable: Variable) -> list[str]:
-    low, high = variable.universe
-    default = ""
-    if isinstance(variable, Output):
-        default = ", no default" if variable.default is None else f", default {variable.default!r}"
-    width = max(map(len, variable.term_names), default=0)
-    lines = [f"  {variable.name} in [{low!r}, {high!r}]{default}"]
-    return [*lines, *(f"    {term.name:{width}}  {_numbers(term)}" for term in variable.terms)]
 
 
 def _numbers(term: Term) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.command_line.evaluation import sample
+from fuzzy_arbiter.command_line.evaluation import parse_sample
 from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.errors import InputError
 
@@ -33,38 +33,39 @@ def draw(
     from fuzzy_arbiter.pictures.style import new_axes, require_matplotlib
 
     require_matplotlib()
-    received = {"--input": inputs, "--output": outputs, "--at": at, "--relief": relief}
+    received: dict[str, Any] = {"--input": inputs, "--output": outputs, "--at": at, "--relief": relief}
     for option, value in received.items():
         if value and option not in PICTURES[kind]:
             raise InputError(f"{kind}: got {option}, expected none but {', '.join(PICTURES[kind])}")
     system = arbiter.system
     known = {"--input": variable_names(system.inputs), "--output": variable_names(system.outputs)}
-    values: Any = sample(at, system) if at or kind == "rules" else {}
-    if kind != "rules" and not isinstance(values, dict):
-        raise InputError(f"--at {at[0]}: expected name=value")
-    if kind == "terms":
-        return _terms(arbiter, [*inputs, *outputs] or [*known["--input"], *known["--output"]], values)
 
-    def names(option: str, received: Sequence[str], n: int) -> Any:
-        chosen = received or known[option][:n]
-        if len(chosen) != n:
-            raise InputError(f"{kind}: {len(chosen)} of {option}, expected {n} of {', '.join(known[option])}")
+    def names(option: str, count: int) -> Sequence[str]:
+        chosen = received[option] or known[option][:count]
+        if len(chosen) != count:
+            raise InputError(f"{kind}: {len(chosen)} of {option}, expected {count} of {', '.join(known[option])}")
         return chosen
 
-    if kind == "rules":
-        ax = pictures.rules(arbiter, values, *names("--output", outputs, 1))
-    elif kind == "profile":
-        ax = pictures.profile(arbiter, names("--input", inputs, 1)[0], values)
-    else:
-        first, second = names("--input", inputs, 2)
-        if kind == "decisions":
+    values: Any = parse_sample(at, system) if at or kind == "rules" else {}
+    if kind != "rules" and not isinstance(values, dict):
+        raise InputError(f"--at {at[0]}: expected name=value")
+    ax: Any
+    match kind:
+        case "terms":
+            return _terms(arbiter, [*inputs, *outputs] or [*known["--input"], *known["--output"]], values)
+        case "rules":
+            ax = pictures.rules(arbiter, values, names("--output", 1)[0])
+        case "profile":
+            ax = pictures.profile(arbiter, names("--input", 1)[0], values)
+        case "decisions":
+            first, second = names("--input", 2)
             ax = pictures.decisions(arbiter, (first, second), values)
-        else:
-            (output,) = names("--output", outputs, 1)
+        case _:
+            (first, second), (output,) = names("--input", 2), names("--output", 1)
             axes = new_axes(6.4, 5.2, projection="3d") if relief else None
             ax = pictures.surface(arbiter, output, (first, second), values, ax=axes)
-    figure: Any = ax.figure
-    return figure  # type: ignore[no-any-return]
+    figure: Figure = ax.figure
+    return figure
 
 
 def middles(at: Sequence[str], system: System) -> list[str]:

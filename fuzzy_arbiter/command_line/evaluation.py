@@ -14,7 +14,7 @@ from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.errors import ArbiterError, InputError
 
 
-def sample(words: Sequence[str], system: System) -> list[float] | dict[str, float]:
+def parse_sample(words: Sequence[str], system: System) -> list[float] | dict[str, float]:
     """Parse words of the command line as a sample."""
     if not words:
         raise InputError(f"got no values, expected {', '.join(variable_names(system.inputs))}")
@@ -22,17 +22,17 @@ def sample(words: Sequence[str], system: System) -> list[float] | dict[str, floa
     if any(named) and not all(named):
         raise InputError("got some values with a name and some without, expected all or none")
     if not any(named):
-        return [number(word, word) for word in words]
+        return [parse_number(word, word) for word in words]
     result: dict[str, float] = {}
     for word in words:
         name, _, value = word.rpartition("=")
         if name in result:
             raise InputError(f"{name} appears twice, expected once")
-        result[name] = number(value, word)
+        result[name] = parse_number(value, word)
     return result
 
 
-def number(text: str, where: str) -> float:
+def parse_number(text: str, where: str) -> float:
     """Parse a text as a number."""
     try:
         return float(text)
@@ -40,7 +40,7 @@ def number(text: str, where: str) -> float:
         raise InputError(f"{where}: {text.strip()!r} is not a number") from None
 
 
-def evaluated(arbiter: Arbiter, inputs: Sequence[float] | Mapping[str, float], as_json: bool) -> str:
+def evaluate(arbiter: Arbiter, inputs: Sequence[float] | Mapping[str, float], as_json: bool) -> str:
     """Return the weights for one sample."""
     weights = arbiter(inputs)._asdict()
     if as_json:
@@ -48,15 +48,15 @@ def evaluated(arbiter: Arbiter, inputs: Sequence[float] | Mapping[str, float], a
     return "\n".join(f"{name} = {weight!r}" for name, weight in weights.items())
 
 
-def evaluated_table(arbiter: Arbiter, path: str, stdin: TextIO | None, as_json: bool) -> str:
+def evaluate_table(arbiter: Arbiter, path: str, stdin: TextIO | None, as_json: bool) -> str:
     """Return the weights for the rows of a CSV table, of a file or, for ``-``, of standard input."""
     where = "standard input" if path == "-" else path
-    lines, rows = _rows(_text(path, where, stdin), where, variable_names(arbiter.system.inputs))
+    rows = _rows(_text(path, where, stdin), where, variable_names(arbiter.system.inputs))
     names = arbiter.system.result_names
     try:
-        weights = arbiter.batch(rows).tolist() if rows else []
+        weights = arbiter.batch(list(rows.values())).tolist() if rows else []
     except ArbiterError:
-        for line, row in zip(lines, rows, strict=True):
+        for line, row in rows.items():
             try:
                 arbiter(row)
             except ArbiterError as error:
@@ -90,27 +90,24 @@ def _text(path: str, where: str, stdin: TextIO | None) -> str:
         raise InputError(f"{where}: {error.strerror or error}") from None
 
 
-def _rows(text: str, where: str, names: Sequence[str]) -> tuple[list[int], list[list[float]]]:
-    """Return line numbers and values of a table, in the order of the inputs."""
+def _rows(text: str, where: str, names: Sequence[str]) -> dict[int, list[float]]:
+    """Return the values of a table in the order of the inputs, by the number of their line."""
     reader = csv.reader(io.StringIO(text.removeprefix("\ufeff"), newline=""), skipinitialspace=True)
-    lines, rows = [], []
+    rows: dict[int, list[float]] = {}
     try:
         header = [name.strip() for name in next(reader, [])]
         for name in names:
             if header.count(name) != 1:
                 fault = "stands twice" if name in header else "is missing"
                 received = ", ".join(map(repr, header)) or "none"
-                received = received if len(received) <= 200 else f"{received[:200]} ..."
                 raise InputError(f"{where}: column {name!r} {fault} in the first line, which has {received}")
-        columns = {name: header.index(name) for name in names}
         for cells in reader:
-            if not any(cell.strip() for cell in cells):
-                continue
             line = f"{where}: line {reader.line_num}"
-            if len(cells) != len(header):
-                raise InputError(f"{line}: {len(cells)} cells, expected {len(header)}")
-            rows.append([number(cells[i], f"{line}: {name}") for name, i in columns.items()])
-            lines.append(reader.line_num)
+            if any(cell.strip() for cell in cells):
+                if len(cells) != len(header):
+                    raise InputError(f"{line}: {len(cells)} cells, expected {len(header)}")
+                row = dict(zip(header, cells, strict=True))
+                rows[reader.line_num] = [parse_number(row[name], f"{line}: {name}") for name in names]
     except csv.Error as error:
         raise InputError(f"{where}: line {reader.line_num}: {error}") from None
-    return lines, rows
+    return rows

@@ -10,22 +10,11 @@ from typing import Any
 from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable, variable_names
 from fuzzy_arbiter.engines.supported import bent
 from fuzzy_arbiter.errors import UnsupportedError
+from fuzzy_arbiter.formats.blocks import Block, RuleBlock, assemble, group_rules
 from fuzzy_arbiter.formats.fcl_terms import format_shape, read_shape, universe_of
 from fuzzy_arbiter.formats.fcl_tokens import RESERVED, chosen_block, cut, sections_of
 from fuzzy_arbiter.formats.fll_terms import TYPES
-from fuzzy_arbiter.formats.notation import (
-    Block,
-    RuleBlock,
-    assembled,
-    format_number,
-    group_rules,
-    located,
-    read_number,
-    refuse,
-    require_word,
-    require_words,
-    unsupported_rule,
-)
+from fuzzy_arbiter.formats.notation import format_number, located, read_number, refuse, require_words, unsupported_rule
 from fuzzy_arbiter.formats.settings import format_settings, read_settings
 from fuzzy_arbiter.formats.vocabulary import WORDS, operator_words, word_of
 from fuzzy_arbiter.propositions import Is, quoted
@@ -82,7 +71,7 @@ def read(text: str, block: str | None = None) -> System:
         blocks = [
             (norms, [(line, _on_first_of_value(rule, outputs)) for line, rule in rules]) for norms, rules in blocks
         ]
-    return assembled(begin.line, inputs, outputs, blocks, name=begin.name or "arbiter", **read_settings(comments))
+    return assemble(begin.line, inputs, outputs, blocks, name=begin.name or "arbiter", **read_settings(comments))
 
 
 def _declared(sections: Sequence[Block], declaration: str, kind: str, taken: Collection[str] = ()) -> list[Block]:
@@ -198,8 +187,7 @@ def _on_first_of_value(rule: Rule, outputs: list[Output]) -> Rule:
 
 def write(system: System) -> str:
     """Format a system as a function block."""
-    require_word(system.name, "fcl", RESERVED)
-    require_words(system, "fcl", RESERVED)
+    require_words(system, "fcl", RESERVED, others=(system.name,))
     _require_one_case(system)
     lines = [f"(* {text} *)" for text in format_settings(system)]
     lines += [f"FUNCTION_BLOCK {system.name}", "", "VAR_INPUT"]

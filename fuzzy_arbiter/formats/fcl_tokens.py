@@ -6,7 +6,8 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple, NoReturn
 
-from fuzzy_arbiter.formats.notation import Block, refuse
+from fuzzy_arbiter.formats.blocks import Block
+from fuzzy_arbiter.formats.notation import refuse
 
 # words of IEC 61131-7 and of jFuzzyLogic's grammar
 _WORDS = (

@@ -7,14 +7,11 @@ from typing import Any
 
 from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable
 from fuzzy_arbiter.errors import FormatError, UnsupportedError
+from fuzzy_arbiter.formats.blocks import Block, RuleBlock, assemble, group_rules
 from fuzzy_arbiter.formats.fll_terms import FUNCTION_NAMES, RESERVED, VALUES, format_shape, read_shape
 from fuzzy_arbiter.formats.notation import (
-    Block,
-    RuleBlock,
-    assembled,
     format_number,
     format_numbers,
-    group_rules,
     located,
     read_number,
     refuse,
@@ -67,7 +64,7 @@ def read(text: str) -> System:
         "points": max((points for _, points in parsed), default=0) or _RESOLUTION,
         **read_settings(comments, settings_of(results)),
     }
-    return assembled(engines[0].line, variables, results, [_rules(block, values) for block in rule_blocks], **options)
+    return assemble(engines[0].line, variables, results, [_rules(block, values) for block in rule_blocks], **options)
 
 
 def _blocks(text: str) -> tuple[list[Block], list[tuple[int, str]]]:

@@ -276,7 +276,7 @@ def test_help_examples_parse(run):
     status, out, _ = run("--help")
     examples = [line.split()[3:] for line in out.splitlines() if line.strip().startswith("python -m")]
     assert status == 0 and len(examples) == 7
-    from fuzzy_arbiter.__main__ import _parsed
+    from fuzzy_arbiter.__main__ import parse
 
     for words in examples:
-        _parsed(words[: words.index("||")] if "||" in words else words)
+        parse(words[: words.index("||")] if "||" in words else words)

@@ -25,7 +25,7 @@ from cosim.mavlink.wire.signing import load_key
 from cosim.scenario.scenario import load_scenario
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter import formats as arbiters
-from fuzzy_arbiter.command_line.evaluation import evaluated_table
+from fuzzy_arbiter.command_line.evaluation import evaluate_table
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.checking.fmu_file import read_fmu
 from plant_fmu.description import model_description
@@ -75,14 +75,14 @@ for _format, _kind, _parser in (
 @reader(
     "table of samples",
     "text",
-    "fuzzy_arbiter.command_line.evaluation:evaluated_table",
+    "fuzzy_arbiter.command_line.evaluation:evaluate_table",
     "fuzzy_arbiter.command_line.evaluation:_rows",
 )
 def samples(seeds: Seeds) -> Case:
     arbiter = Arbiter()
 
     def read(path: Path) -> object:
-        return evaluated_table(arbiter, str(path), None, as_json=False)
+        return evaluate_table(arbiter, str(path), None, as_json=False)
 
     return seeds.file("it.csv", read, b'obstacle,shape, depth,note\n0.75,1,0,a\n1,0.5,0.25,"b,c"\n\n0,0,1e-3,\n')
 
