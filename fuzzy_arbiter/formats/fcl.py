@@ -76,32 +76,30 @@ def read(text: str, block: str | None = None) -> System:
 
 def _declared(sections: Sequence[Block], declaration: str, kind: str, taken: Collection[str] = ()) -> list[Block]:
     """Return the sections of the declared variables in their order, with the ranges of the declarations."""
-    declared: dict[str, tuple[int, str]] = {}  # line and range by name
+    blocks: dict[str, Block] = {}
+    for section in sections:
+        if section.kind == kind and blocks.setdefault(section.name, section) is not section:
+            refuse(section.line, f"{section.title} appears twice")
+    declared: dict[str, int] = {}  # line by name
     names: list[str] = []
     for line, text in (entry for section in sections if section.kind == declaration for entry in section.many):
-        if match := _DECLARATION.fullmatch(text):
-            names = match[1].split(" , ")
-        elif not names or not text.upper().startswith("RANGE "):
+        match = _DECLARATION.fullmatch(text)
+        if not match and not (names and text.upper().startswith("RANGE ")):
             refuse(line, f"{text!r}, expected a variable's name, a colon and REAL")
+        names = match[1].split(" , ") if match else names
         for name in names:
+            if not match and name in blocks:
+                blocks[name].add(line, "RANGE", text[6:].removeprefix(":= "))
             if match and (name in declared or name in taken or name.lower() in RESERVED):
                 fault = "a word of the language" if name.lower() in RESERVED else "declared twice"
                 refuse(line, f"{name!r} is {fault}")
-            if not match and declared[name][1]:
-                refuse(line, f"RANGE of {name!r} appears twice")
-            declared[name] = (line, "" if match else text[6:].removeprefix(":= "))
-    blocks: dict[str, Block] = {}
-    for section in sections:
-        if section.kind == kind and section.name not in declared:
-            known = ", ".join(declared) or "none: none is declared"
-            refuse(section.line, f"{section.title}, expected one of {known}")
-        if section.kind == kind and blocks.setdefault(section.name, section) is not section:
-            refuse(section.line, f"{section.title} appears twice")
-    for name, (line, universe) in declared.items():
+            declared.setdefault(name, line)
+    for name, section in blocks.items():
+        if name not in declared:
+            refuse(section.line, f"{section.title}, expected one of {', '.join(declared) or 'none: none is declared'}")
+    for name, line in declared.items():
         if name not in blocks:
             refuse(line, f"{name!r} has no {kind}")
-        if universe:
-            blocks[name].add(line, "RANGE", universe)
     return [blocks[name] for name in declared]
 
 
@@ -175,14 +173,13 @@ def _rules(section: Block, any_is_term: set[str]) -> RuleBlock:
 
 def _on_first_of_value(rule: Rule, outputs: list[Output]) -> Rule:
     """Return a rule that concludes the first of terms of one value: jFuzzyLogic joins strengths by value."""
-    first: dict[Is, Is] = {}
-    for output in outputs:
-        if output.weighted and output.aggregation != "sum":
-            for term in output.terms:
-                alike = next(other.name for other in output.terms if other.shape == term.shape)
-                first[Is(output.name, term.name)] = Is(output.name, alike)
-    conclusions = tuple(first.get(c, c) for c in rule.conclusions)
-    return rule if conclusions == rule.conclusions else replace(rule, conclusions=conclusions)
+    first = {
+        Is(output.name, term.name): Is(output.name, next(t.name for t in output.terms if t.shape == term.shape))
+        for output in outputs
+        if output.weighted and output.aggregation != "sum"
+        for term in output.terms
+    }
+    return replace(rule, conclusions=tuple(first.get(c, c) for c in rule.conclusions))
 
 
 def write(system: System) -> str:

@@ -63,7 +63,7 @@ def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
         elif kind == "open":
             refuse(line, f"the comment that begins here with {word!r} has no end")
         elif kind == "other":
-            refuse(line, f"{word!r} is no sign of FCL")
+            refuse(line, f"{word!r} is no sign of FCL, whose names are of A to Z, a to z, 0 to 9 and _")
         elif kind != "space":
             tokens.append(Token(kind, word, line, spaced))
         spaced = kind in ("space", "comment")
@@ -86,39 +86,38 @@ def sections_of(tokens: list[Token]) -> tuple[list[Block], bool]:
         _unexpected(tokens, 0, "FUNCTION_BLOCK")
     name, i = _head(tokens, 0)
     sections, by_line = [Block("FUNCTION_BLOCK", name, tokens[0].line)], False
-    while tokens[i].text.upper() != _END:
-        i, without_sign = _read_section(tokens, i, sections)
-        by_line |= without_sign
+    while (kind := tokens[i].text.upper()) != _END:
+        if kind not in SECTIONS:
+            _unexpected(tokens, i, " or ".join((*SECTIONS, _END)))
+        keys, end = SECTIONS[kind]
+        section = Block(kind, "", tokens[i].line)
+        sections.append(section)
+        i += 1
+        if keys and tokens[i].kind == "name" and tokens[i].text.upper() not in (*keys, end):
+            section.name, section.line = tokens[i].text, tokens[i].line
+            i += 1
+        while tokens[i].text.upper() != end:
+            start, i = i, _statement_end(tokens, i, keys, end)
+            _add(section, tokens[start:i])
+            by_line |= tokens[i].text != ";"
+            i += tokens[i].text == ";"
+        i += 1
     if tokens[i + 1].kind != "end":
         _unexpected(tokens, i + 1, "the end of the file")
     return sections, by_line
 
 
-def _read_section(tokens: Sequence[Token], i: int, sections: list[Block]) -> tuple[int, bool]:
-    """Append the section at index i; return the index after it, and if a rule in it ends with its line."""
-    kind = tokens[i].text.upper()
-    if kind not in SECTIONS:
-        _unexpected(tokens, i, " or ".join((*SECTIONS, _END)))
-    keys, end = SECTIONS[kind]
-    section = Block(kind, "", tokens[i].line)
-    sections.append(section)
-    i, by_line = i + 1, False
-    if keys and tokens[i].kind == "name" and tokens[i].text.upper() not in (*keys, end):
-        section.name, section.line = tokens[i].text, tokens[i].line
+def _statement_end(tokens: Sequence[Token], start: int, keys: Sequence[str], end: str) -> int:
+    """Return the index after the statement at an index, of its semicolon unless a rule ends with its line."""
+    is_rule, i = tokens[start].text.upper() == "RULE", start
+    while tokens[i].text != ";" and not (is_rule and i > start and _ends_rule(tokens, i)):
+        word = tokens[i].text.upper()
+        if tokens[i].kind == "end" or word in _LIMITS:
+            _unexpected(tokens, i, ";" if i > start and word == end else end)
+        if i > start + 1 and not is_rule and word in keys and tokens[i + 1].text in (":", ":="):
+            _unexpected(tokens, i, ";")
         i += 1
-    while tokens[i].text.upper() != end:
-        start, is_rule = i, tokens[i].text.upper() == "RULE"
-        while tokens[i].text != ";" and not (is_rule and i > start and _ends_rule(tokens, i)):
-            word = tokens[i].text.upper()
-            if tokens[i].kind == "end" or word in _LIMITS:
-                _unexpected(tokens, i, ";" if i > start and word == end else end)
-            if i > start + 1 and not is_rule and word in keys and tokens[i + 1].text in (":", ":="):
-                _unexpected(tokens, i, ";")
-            i += 1
-        _add(section, tokens[start:i])
-        by_line |= tokens[i].text != ";"
-        i += tokens[i].text == ";"
-    return i + 1, by_line
+    return i
 
 
 def _ends_rule(tokens: Sequence[Token], i: int) -> bool:

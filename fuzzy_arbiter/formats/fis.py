@@ -108,7 +108,7 @@ def _add_entry(section: Block, line: int, content: str) -> None:
     if not entry:
         refuse(line, f"{content!r}, expected a key, = and its value")
     key, value = entry.groups()
-    if re.match(r"TypeRed|MF[0-9]+[UL]MF", key):
+    if re.match(r"TypeRed|MF[0-9]+[UL]", key):
         refuse(line, f"{key} is of a type-2 system, expected one of type 1")
     if key in _TEXTS:
         quoted = _QUOTED.fullmatch(value)

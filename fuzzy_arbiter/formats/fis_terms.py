@@ -41,7 +41,7 @@ def read_function(function: str, text: str, line: int, term: str, inputs: int | 
         return Formula(text)
     kind, order = _TYPES[function]
     count = len(order)
-    numbers = numbers_of(text, line, f"a parameter of term {term!r}")
+    numbers = numbers_of(text, line, f"a parameter of term {term!r}", infinite=True)
     if len(numbers) == 4 > count and order and not any(numbers[count:]):
         del numbers[count:]  # the zeros with which MATLAB's old files fill all up to four
     if function in _WITHOUT_HEIGHT and len(numbers) != count:
@@ -80,16 +80,14 @@ def with_unique_names(terms: Sequence[Term]) -> tuple[Term, ...]:
     return tuple(renamed)
 
 
-def numbers_of(text: str, line: int, what: str) -> list[float]:
+def numbers_of(text: str, line: int, what: str, infinite: bool = False) -> list[float]:
     """Parse the numbers in brackets; each may be an expression such as ``-pi/4``."""
-    return [_number(part, line, what) for part in re.split(r"[\s,;]+", text.strip()) if part]
+    return [_number(part, line, what, infinite) for part in re.split(r"[\s,;]+", text.strip()) if part]
 
 
-def _number(text: str, line: int, what: str) -> float:
-    if "pi" not in text:
-        return read_number(text, line, what)
-    whole = Expression(text)
-    return whole({}) if not whole.names else read_number(text, line, what)
+def _number(text: str, line: int, what: str, infinite: bool) -> float:
+    whole = Expression(text) if "pi" in text else None
+    return whole({}) if whole and not whole.names else read_number(text, line, what, infinite)
 
 
 def _crossed(a: float, b: float, c: float, d: float) -> Shape:

@@ -65,7 +65,8 @@ def read_shape(kind: str, text: str, line: int, inputs: int | None = None) -> Me
         refuse(line, f"term type {kind!r} is not known here, expected one of {', '.join(TYPES)}")
     if kind == "Function":
         return Formula(text)
-    return shape_of(kind, [_number(part, line, kind) for part in text.split()], line, inputs)
+    numbers = [read_number(part, line, f"{kind}'s number", infinite=True) for part in text.split()]
+    return shape_of(kind, numbers, line, inputs)
 
 
 def shape_of(kind: str, numbers: list[float], line: int, inputs: int | None, word: str = "") -> Membership | Value:
@@ -97,11 +98,6 @@ def _value(kind: str, numbers: Sequence[float], line: int, inputs: int | None, w
     return Constant(numbers[0]) if kind == "Constant" else Linear(tuple(numbers[:inputs]), *numbers[inputs:])
 
 
-def _number(text: str, line: int, kind: str) -> float:
-    infinite = {"inf": math.inf, "-inf": -math.inf}.get(text)
-    return read_number(text, line, f"{kind}'s number") if infinite is None else infinite
-
-
 def _points(kind: str, numbers: Sequence[float], line: int) -> list[Point]:
     if kind == "Discrete":
         return list(zip(numbers[::2], numbers[1::2], strict=True))
@@ -118,10 +114,8 @@ def _points(kind: str, numbers: Sequence[float], line: int) -> list[Point]:
     if kind == "Rectangle":
         start, end = sorted(numbers)
         return [(start, 0.0), (start, 1.0), (end, 1.0), (end, 0.0)]
-    # an infinite foot makes a shoulder
+    # an infinite foot makes a shoulder, and so do a foot and a top that are infinite
     left, *top, right = numbers
-    feet_left = [] if left == -math.inf else [(left, 0.0)]
-    feet_right = [] if right == math.inf else [(right, 0.0)]
-    if len(top) == 2 and top[0] == top[1]:
-        del top[0]
-    return [*feet_left, *((x, 1.0) for x in top), *feet_right]
+    infinite = ({left} & {-math.inf}) | ({right} & {math.inf})
+    points = [(left, 0.0), *((x, 1.0) for x in dict.fromkeys(top)), (right, 0.0)]
+    return [(x, degree) for x, degree in points if x not in infinite] or [(0.0, 1.0)]

@@ -29,8 +29,10 @@ def format_numbers(xs: Iterable[float]) -> str:
     return " ".join(map(format_number, xs))
 
 
-def read_number(text: str, line: int, what: str) -> float:
-    """Parse a text as a finite number."""
+def read_number(text: str, line: int, what: str, infinite: bool = False) -> float:
+    """Parse a text as a finite number, or as an infinite one where that is allowed."""
+    if infinite and re.fullmatch("[+-]?inf", text, re.IGNORECASE):
+        return float(text)
     x = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(x):
         refuse(line, f"{what} is {text!r}, expected a finite number")

@@ -134,8 +134,10 @@ def _text(value: object, where: str) -> str:
 
 
 def _numbers(value: object, where: str, count: int = 2) -> tuple[float, ...]:
-    if not isinstance(value, list) or len(value) != count:
+    if not isinstance(value, list):
         _refuse(where, value, f"a list of {count} numbers")
+    if len(value) != count:
+        raise FormatError(f"{where}: got a list of {len(value)}, expected a list of {count} numbers")
     return tuple(_number(x, where) for x in value)
 
 

@@ -23,11 +23,8 @@ def output_index(system: System, name: str) -> int:
 def weights_over(
     arbiter: Arbiter, over: Sequence[str], at: Mapping[str, float] | None, positions: Callable[[Variable], Array]
 ) -> tuple[list[Array], Array, str]:
-    """Return positions along inputs, weights over their grid (the last axis: outputs), and the other inputs in words.
-
-    The first input runs along the columns; other inputs are `at` a value, or at the middle of their universe. Weights
-    of an undefined output are NaN.
-    """
+    """Return positions along inputs, weights over their grid and of each output, and the other inputs in words."""
+    # the first input runs along the columns; other inputs are at a value, or at the middle of their universe
     inputs, at = {v.name: v for v in arbiter.system.inputs}, dict(at or {})
     for name in (*over, *at):
         if name not in inputs:
