@@ -178,7 +178,7 @@ def write(system: System) -> str:
 
 
 def _rule(i: int, rule: Rule) -> str:
-    conclusions = " and ".join(map(str, rule.conclusions))
+    conclusions = " and ".join(_condition(conclusion, i, rule) for conclusion in rule.conclusions)
     weight = "" if rule.weight == 1.0 else f" with {format_number(rule.weight)}"
     return f"if {_condition(rule.condition, i, rule)} then {conclusions}{weight}"
 

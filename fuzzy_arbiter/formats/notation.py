@@ -10,7 +10,7 @@ from typing import NoReturn
 
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
-from fuzzy_arbiter.propositions import is_identifier
+from fuzzy_arbiter.propositions import KEYWORDS
 from fuzzy_arbiter.rule import Rule
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
@@ -58,10 +58,10 @@ def require_words(
 ) -> None:
     """Require that a format accepts the names of a system's variables and terms, and some others."""
     for name in (*others, *(name for v in (*system.inputs, *system.outputs) for name in (v.name, *v.term_names))):
-        if not is_identifier(name) or name.startswith("_"):
+        if not re.fullmatch(r"[^\W\d_]\w*", name, re.ASCII if format == "fcl" else 0):
             expected = "expected letters, digits and _, a letter first"
             raise UnsupportedError(f"{format} cannot say the name {name!r}: {expected}")
-        if name.lower() in reserved or name in functions:
+        if name.lower() in {*KEYWORDS, *reserved} or name in functions:
             raise UnsupportedError(f"{format} cannot say the name {name!r}: it is a word of the language")
 
 

@@ -99,13 +99,13 @@ def test_unsupported_features_are_rejected_by_name(change, fault):
         writes(replace(TIPPING, **change), "fll")
 
 
-def test_names_differ_from_functions_by_capital_letters():
+def test_names_differ_from_functions_by_capital_letters_and_may_have_accents():
     v = Variable("LE", (0, 1), (Term("Abs", rising(0, 1)),))
-    values = {"Min": Formula("le(LE, 0.5) + LE")}
-    system = System((v,), (Output("y", (0, 2), values, defuzzifier="average"),), ("if LE is Abs then y is Min",))
+    values = {"Nível": Formula("le(LE, 0.5) + LE")}
+    system = System((v,), (Output("é", (0, 2), values, defuzzifier="average"),), ('if LE is Abs then "é" is "Nível"',))
     system = replace(system, points=1000)
     assert reads(writes(system, "fll"), "fll") == system
-    assert Arbiter(system)([0.25])["y"] == 1.25
+    assert Arbiter(system)([0.25])["é"] == 1.25
 
 
 def test_engine_names_may_be_any_text():
