@@ -10,8 +10,10 @@ from controller.regions.shapes.cylinder import Cylinder
 from controller.regions.shapes.depth_band import DepthBand
 from controller.regions.shapes.ellipsoid import Ellipsoid
 from controller.regions.shapes.half_space import HalfSpace
+from controller.regions.shapes.mesh import Mesh
 from controller.regions.shapes.orientation import Orientation
 from controller.regions.shapes.pipe import Pipe
+from controller.regions.shapes.points import Points
 from controller.regions.shapes.prism import Prism
 from controller.regions.shapes.sphere import Sphere
 from controller.regions.shapes.visibility import Visibility
@@ -23,8 +25,10 @@ __all__ = [
     "DepthBand",
     "Ellipsoid",
     "HalfSpace",
+    "Mesh",
     "Orientation",
     "Pipe",
+    "Points",
     "Prism",
     "Region",
     "Sphere",

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Literal, NamedTuple
 
-from controller.regions.mesh import Mesh
 from controller.regions.shape import Array, Bounds, Shape, Vector3
+from controller.regions.triangle_mesh import Mesh
 
 _FACES = ("unit", "packed", "numbers", "bounds")
 
@@ -74,6 +74,7 @@ class Entry:
         keys = [field.name for field in fields(self.shape)]  # type: ignore[arg-type]
         if sorted(self.units) != sorted(keys):
             raise TypeError(f"shape {name}: units are of {', '.join(self.units)}, expected of {', '.join(keys)}")
-        packed, named = len(self.example.packed()), len(self.example.numbers())
+        # those of a file are read when they are first needed
+        packed, named = (0, 0) if "file" in keys else (len(self.example.packed()), len(self.example.numbers()))
         if packed != named:
             raise TypeError(f"shape {name}: numbers names {named} numbers, expected the {packed} that packed gives")

@@ -17,7 +17,6 @@ from controller.compiling.function import BoundCall, CompiledFunction
 from controller.errors import RegionError
 from controller.regions.entry import Entry
 from controller.regions.kinds import DEPTH_BAND, FIRST_OF_ATTITUDE, SPHERE, evaluate_shape, evaluate_shape_of_attitude
-from controller.regions.mesh import Mesh
 from controller.regions.shape import (
     Array,
     Bounds,
@@ -31,6 +30,7 @@ from controller.regions.shape import (
 from controller.regions.shapes import ENTRIES
 from controller.regions.shapes.depth_band import band_about
 from controller.regions.shapes.sphere import sphere_about
+from controller.regions.triangle_mesh import Mesh
 from controller.stack_array import Rows3
 from controller.stack_array import Vector3 as Point
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from controller.regions.mesh import Mesh, sector
 from controller.regions.region_set import SHAPES, shape_entry, surface_of
 from controller.regions.shape import Bounds, Shape
+from controller.regions.triangle_mesh import Mesh, sector
 from cosim.export.excerpt import Excerpt
 from cosim.replay.header import header_of
 from cosim.replay.region_changes import list_region_changes, read_command_log

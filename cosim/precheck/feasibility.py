@@ -9,7 +9,7 @@ import numpy as np
 
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.path_planning.search import line_margin
-from controller.regions import Region
+from controller.regions import Mesh, Points, Region
 from controller.regions.region_set import evaluate_at_pose, of_attitude
 from cosim.precheck.finding import Finding, status
 from cosim.precheck.path_search import SearchedPath, find_path, path_limits
@@ -31,6 +31,7 @@ def region_findings(scenario: Scenario) -> Iterator[Finding]:
     moving = " Some move: this is how they are at time 0." if scenario.moving else ""
     violated = [region for region in regions if _clearance(region, scenario) < 0.0]
     yield from _surface(scenario)
+    yield from _grids([goal, *regions])
     yield from (_start(region, scenario) for region in violated)
     yield from _common(goal, placed, low, high, moving)
     yield from _between(placed, low, high)
@@ -38,6 +39,16 @@ def region_findings(scenario: Scenario) -> Iterator[Finding]:
     if scenario.goal_then:
         text = f"The goal's next {len(scenario.goal_then)} places are not checked: the findings are for the first."
         yield Finding("regions", "next places", "note", text)
+
+
+def _grids(regions: Sequence[Region]) -> Iterator[Finding]:
+    """Yield a note on each region from a file, by how much the spacing of its grid enlarges or shrinks it."""
+    for region in regions:
+        if isinstance(shape := region.shape, Mesh | Points):
+            error, spacing = shape.error(), shape.grid.spacing
+            which = "larger" if region.keep == "out" else "smaller"
+            text = f"{region.name}: up to {error:.2g} m {which} than its file says, by a grid of {spacing:.2g} m."
+            yield Finding("regions", "grid", "note", text, numbers={"error": error, "spacing": spacing})
 
 
 def _surface(scenario: Scenario) -> Iterator[Finding]:

@@ -62,9 +62,11 @@ class ShapeTable(Table, frozen=True, tag_field="type", omit_defaults=True):
 
     def __post_init__(self) -> None:
         try:
-            self.shape  # noqa: B018
+            self.shape.bounds()  # reads the file of a shape that has one
         except RegionError as error:
-            raise ValueError(str(error).partition(": ")[2]) from error
+            name, _, rest = str(error).partition(": ")
+            is_file = name.endswith(str(getattr(self, "file", None)))
+            raise ValueError(str(error) if is_file else rest) from error
 
     @property
     def shape(self) -> Shape:

@@ -46,6 +46,7 @@ from cosim.scenario.toml_text import scenario_text
 from cosim.scenario.validation import (
     check_digest,
     check_goal,
+    check_grids,
     check_intersection,
     check_law,
     check_regions,
@@ -283,12 +284,34 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = (), impor
 def table_of_files(scenario: Scenario) -> dict[str, Any]:
     """Return the table of a scenario, with the names of the copies in `files_of`."""
     law = scenario.table["law"] | ({"file": scenario.law.name} if scenario.law.fmu else {})
-    return scenario.table | {"law": law} | ({"vehicle": VEHICLE_COPY} if scenario.vehicle_file else {})
+    copies, regions = _shape_copies(scenario), scenario.table["regions"]
+    regions = tuple(region | {"shape": _with_copy(region["shape"], copies)} for region in regions)
+    table = scenario.table | {"law": law, "goal": _with_copy(scenario.table["goal"], copies), "regions": regions}
+    return table | ({"vehicle": VEHICLE_COPY} if scenario.vehicle_file else {})
+
+
+def _with_copy(shape: dict[str, Any], copies: dict[str, str]) -> dict[str, Any]:
+    """Return a shape's table with the name of the copy of its file."""
+    return shape | {"file": copies[shape["file"]]} if "file" in shape else shape
+
+
+def _shape_copies(scenario: Scenario) -> dict[str, str]:
+    """Return the names of the copies of the shapes' files, which differ."""
+    shapes = [scenario.goal, *(secondary.region.shape for secondary in scenario.regions)]
+    files = dict.fromkeys(shape.file for shape in shapes if hasattr(shape, "file"))
+    taken, copies = {"scenario.toml", VEHICLE_COPY, scenario.law.name}, {}
+    for file in files:
+        path = Path(file)
+        names = (path.name, *(f"{path.stem}-{i}{path.suffix}" for i in range(2, len(files) + 3)))
+        copies[file] = next(name for name in names if name not in taken)
+        taken.add(copies[file])
+    return copies
 
 
 def files_of(scenario: Scenario) -> dict[str, bytes]:
     """Return the files that repeat a scenario, by name: its own, and copies of those that it names."""
     sources = {VEHICLE_COPY: scenario.vehicle_file, scenario.law.name: scenario.law.fmu and scenario.law.fmu.file}
+    sources |= {name: Path(file) for file, name in _shape_copies(scenario).items()}
     try:
         copies = {name: source.read_bytes() for name, source in sources.items() if source}
     except OSError as error:
@@ -347,6 +370,7 @@ def make_scenario(file: File, name: str, vehicle: Vehicle | None = None) -> Scen
     time = file.time
     goal, motion = check_goal(file)
     regions = check_regions(file.regions)
+    check_grids(Region("goal", goal, "in"), regions)
     criteria = check_criteria(file.criteria)
     overlapping = check_intersection(file.intersection, regions)
     slots = obstacle_slots(file)

@@ -72,8 +72,8 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
         vehicle = table.get("vehicle")
         if isinstance(vehicle, str) and vehicle.endswith(".toml"):  # relative to the file that names it
             table["vehicle"] = str(folder / vehicle)
-        arbiter, law = table.get("arbiter"), table.get("law")
-        for holder in (arbiter, law):
+        shapes = (region.get("shape") for region in _tables(table, "regions"))
+        for holder in (table.get("arbiter"), table.get("law"), table.get("goal"), *shapes):
             if isinstance(holder, dict) and not holder.get("text"):
                 file = holder.get("file")
                 if file and isinstance(file, str):  # likewise

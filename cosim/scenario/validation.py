@@ -7,7 +7,7 @@ import functools
 import hashlib
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 from controller import LAWS
 from controller.driven_axes import AXES, PITCH, require_driven
 from controller.quaternion import down_in_body
-from controller.regions import Region, Sphere
+from controller.regions import Mesh, Points, Region, Sphere
 from controller.regions.region_set import of_attitude
 from controller.regions.shape import Shape
 from cosim.errors import ScenarioError
@@ -109,6 +109,18 @@ def check_tables(file: File, regions: tuple[SecondaryRegion, ...], vehicle: Vehi
         _require(file.law.name == "ismail_dunnigan", "record.lyapunov", "true", "false: V of (31) is the paper's law's")
         names = [r.region.name for r in regions if of_attitude(r.region.shape)]
         _require(not names, "record.lyapunov", "true", f"false: the analysis knows no attitude in regions ({names})")
+
+
+def check_grids(goal: Region, regions: Sequence[SecondaryRegion]) -> None:
+    """Check that shapes from files err on the safe side: larger where kept out of, smaller where kept within."""
+    for key, region in (("goal", goal), *((f"regions.{r.region.name}.shape", r.region) for r in regions)):
+        if region.keep == "in" and isinstance(region.shape, Mesh):
+            offset = region.shape.offset
+            _require(offset < 0.0, f"{key}.offset", offset, "below 0 m: kept within, the mesh must err inward")
+        _require(
+            region.keep == "out" or not isinstance(region.shape, Points), f"{key}.type", "'points'",
+            "another shape to keep within: points are kept out of",
+        )  # fmt: skip
 
 
 def expand_parameters(parameters: Mapping[str, float], vehicle: Vehicle) -> dict[str, float]:

@@ -109,6 +109,7 @@ def _require(scenario: Scenario) -> None:
     """Raise a RunError for features that the FMUs of a system do not support."""
     streamed, engine = next((r.region.name for r in scenario.regions if r.streamed), ""), scenario.arbiter.engine
     require_builtin_law(scenario)
+    from_file = next((r.region.name for r in scenario.regions if hasattr(r.region.shape, "file")), "")
     for ok, key, received, expected in (
         (
             engine in _EXACT,
@@ -118,6 +119,7 @@ def _require(scenario: Scenario) -> None:
         ),
         (not scenario.commands.enabled, "commands.enabled", "true", "false: a system takes no commands"),
         (not scenario.goal_streamed, "goal.streamed", "true", "false"),
+        (not from_file, f"regions.{from_file}.shape", "of a file", "a shape whose numbers can be parameters"),
         (not streamed, f"regions.{streamed}.streamed", "true", "false"),
     ):
         if not ok:

@@ -10,9 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from controller.regions.entry import Entry
-from controller.regions.mesh import Mesh, closed_grid
 from controller.regions.numbers import LENGTH, PART, SIZE, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, centered_bounds, require, require_finite, unit
+from controller.regions.triangle_mesh import Mesh, closed_grid
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ import numpy as np
 from controller.quaternion import rotation_matrix
 from controller.regions.entry import Entry
 from controller.regions.geometry import product_distance, to_local, to_world
-from controller.regions.mesh import Mesh, place_points
 from controller.regions.numbers import SIZE, TURNED, Number, vector
 from controller.regions.shape import (
     Array,
@@ -25,6 +24,7 @@ from controller.regions.shape import (
     unit,
     with_former_spelling,
 )
+from controller.regions.triangle_mesh import Mesh, place_points
 
 
 @with_former_spelling

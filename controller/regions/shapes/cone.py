@@ -9,9 +9,9 @@ from typing import ClassVar
 from controller.arithmetic import hypotenuse
 from controller.regions.entry import Entry
 from controller.regions.geometry import clamp
-from controller.regions.mesh import Mesh, sector
 from controller.regions.numbers import LENGTH, PART, SIZE, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, require, require_finite, unit
+from controller.regions.triangle_mesh import Mesh, sector
 
 
 @dataclass(frozen=True)

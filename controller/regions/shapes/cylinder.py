@@ -10,7 +10,6 @@ import numpy as np
 
 from controller.regions.entry import Entry
 from controller.regions.geometry import product_distance
-from controller.regions.mesh import Mesh, circle, frame, lathe
 from controller.regions.numbers import LENGTH, PART, SIZE, Number, vector
 from controller.regions.shape import (
     UP_TO_ROUNDING,
@@ -24,6 +23,7 @@ from controller.regions.shape import (
     require_finite,
     unit,
 )
+from controller.regions.triangle_mesh import Mesh, circle, frame, lathe
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from controller.regions.entry import Entry
-from controller.regions.mesh import Mesh, patches
 from controller.regions.numbers import LENGTH, SIZE, Number
 from controller.regions.shape import Array, Bounds, Evaluation, require, require_finite
+from controller.regions.triangle_mesh import Mesh, patches
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from controller.arithmetic import length3, square
 from controller.quaternion import rotation_matrix
 from controller.regions.entry import Entry
 from controller.regions.geometry import to_local, to_world
-from controller.regions.mesh import Mesh, ball, place_points
 from controller.regions.numbers import SIZE, TURNED, Number, vector
 from controller.regions.shape import (
     Array,
@@ -26,6 +25,7 @@ from controller.regions.shape import (
     unit,
     with_former_spelling,
 )
+from controller.regions.triangle_mesh import Mesh, ball, place_points
 
 _STEPS = 200  # maximum number of steps, more than the root below ever needs
 

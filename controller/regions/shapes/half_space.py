@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from controller.regions.entry import Entry
-from controller.regions.mesh import Mesh, patches
 from controller.regions.numbers import LENGTH, PART, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, require_finite, unit
+from controller.regions.triangle_mesh import Mesh, patches
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ import numpy as np
 
 from controller.regions.entry import Entry
 from controller.regions.geometry import clamp
-from controller.regions.mesh import AROUND, Mesh, lathe, weld
 from controller.regions.numbers import LENGTH, SIZE, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, join, require, require_finite
+from controller.regions.triangle_mesh import AROUND, Mesh, lathe, weld
 
 _MAX_STEPS = 20_000  # maximum number of steps of a ray; many where it runs just inside a straight surface
 _ROUNDING = 1e-12  # distance to the surface that counts as 0, as a fraction of the radius

@@ -11,9 +11,9 @@ import numpy as np
 from controller.arithmetic import hypotenuse
 from controller.regions.entry import Entry
 from controller.regions.geometry import clamp, product_distance
-from controller.regions.mesh import Mesh
 from controller.regions.numbers import LENGTH, Number
 from controller.regions.shape import Array, Bounds, Evaluation, Vector2, require, require_finite
+from controller.regions.triangle_mesh import Mesh
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from typing import ClassVar
 import numpy as np
 
 from controller.regions.entry import Entry
-from controller.regions.mesh import Mesh, ball
 from controller.regions.numbers import LENGTH, SIZE, Number, vector
 from controller.regions.shape import (
     Array,
@@ -22,6 +21,7 @@ from controller.regions.shape import (
     require_finite,
     with_former_spelling,
 )
+from controller.regions.triangle_mesh import Mesh, ball
 
 
 @with_former_spelling

@@ -18,7 +18,7 @@ BUOYANCY = f"{PARAMETERS}buoyancy"
 _STARTS = {**{f"plant.current.{i}": f"current.{axis}" for i, axis in enumerate("xyz")}, BUOYANCY: "buoyancy"}
 _NOISE = ("sensing.position_noise", "sensing.velocity_noise")
 _AXES = {"x": 0, "y": 1, "z": 2, "north": 0, "east": 1}
-_POINTS = ("center", "feature", "point", "middle", "corner")  # packed numbers that are a position
+_POINTS = ("center", "feature", "point", "middle", "corner", "position")  # packed numbers that are a position
 _DEPTHS = ("top", "bottom", "depth")  # packed numbers that are a depth
 
 Axes = tuple[tuple[str, ...], ...]  # keys that move a region along each axis

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.regions.mesh import Mesh, frame
 from controller.regions.region_set import shape_entry, surface_of
 from controller.regions.shape import Bounds, Shape
+from controller.regions.triangle_mesh import Mesh, frame
 from cosim.simulation.signals import Array
 
 _TURN = np.linspace(0.0, 2.0 * np.pi, 73)  # rad

@@ -22,9 +22,9 @@ from controller.regions import (
     Region,
     Sphere,
 )
-from controller.regions.mesh import AROUND, closed_grid, patches, sector
 from controller.regions.region_set import clearances_at, surface_of
 from controller.regions.shapes import ENTRIES
+from controller.regions.triangle_mesh import AROUND, closed_grid, patches, sector
 
 LIMITS = ((-4.0, -3.0, 0.0), (4.0, 5.0, 6.0))
 TURNED = (0.9, 0.1, -0.3, 0.2)
