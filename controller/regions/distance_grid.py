@@ -6,6 +6,7 @@
 # inside, for the distance to what is outside, likewise. Beyond the grid, whose nearest point is c, the angle at c
 # between p and any point of the body is at least a right one:
 #     d(p)^2 >= |p - c|^2 + d(c)^2, so that (1) holds with D(p)^2 = |p - c|^2 + D(c)^2.                            (2)
+# There the distance to the upright box about the body, which is convex and thus below D on the grid, is another bound.
 # Hence D <= sqrt(s^2 + 3/4 h^2) holds wherever d <= s: the region of that level contains the body grown by s.
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import numpy as np
 import platformdirs
 from numpy.typing import NDArray
 
+from controller.arithmetic import length3
 from controller.compiling.library import is_trusted, write_atomic
 from controller.errors import RegionError
 from controller.regions.geometry import clamp
@@ -34,7 +36,7 @@ _DEFAULT_NODES = 80_000  # number of nodes without a stated spacing
 _BORDER = 2  # number of cells around the grown body
 _QUANTUM = 2.0**-10  # m, of which distances are whole multiples: pages and caches are a third as large
 _VERSION = 1  # of what is cached
-_FIRST = 11  # index of the first distance in the packed numbers
+_FIRST = 12  # index of the first distance in the packed numbers
 
 log = logging.getLogger(__name__)
 
@@ -46,6 +48,7 @@ class DistanceGrid(NamedTuple):
     spacing: float  # m
     distances: Array  # (nx, ny, nz) m, from the body before it is grown, negative inside
     level: float  # m, interpolated distance at the region's surface
+    border: float  # m, from the grid's ends to the body's upright box
 
     def error(self, offset: float) -> float:
         """Return by how much the region is larger than the body grown by an offset [m], or smaller for one below 0."""
@@ -54,7 +57,7 @@ class DistanceGrid(NamedTuple):
     def packed(self, position: tuple[float, ...]) -> tuple[float, ...]:
         """Return the numbers that `distance_grid` reads, for a grid whose frame is at a position [m, NED]."""
         return (
-            *position, *self.low.tolist(), self.spacing, *map(float, self.distances.shape), self.level,
+            *position, *self.low.tolist(), self.spacing, *map(float, self.distances.shape), self.level, self.border,
             *self.distances.ravel().tolist(),
         )  # fmt: skip
 
@@ -64,7 +67,7 @@ class DistanceGrid(NamedTuple):
         distances = (Number(f"distance[{i}]", *LENGTH) for i in range(1, self.distances.size + 1))
         return (
             *vector("position", LENGTH), *vector("low", LENGTH), Number("spacing", *SIZE), *counts,
-            Number("level", *LENGTH), *distances,
+            Number("level", *LENGTH), Number("border", *LENGTH), *distances,
         )  # fmt: skip
 
     def bounds(self, position: tuple[float, ...]) -> Bounds:
@@ -129,7 +132,8 @@ def make_grid(
     # Units of arguments: offset, spacing [m]
     size = body[1] - body[0] + 2.0 * max(offset, 0.0)
     h = spacing or _default_spacing(size)
-    low = body[0] - max(offset, 0.0) - _BORDER * h
+    border = max(offset, 0.0) + _BORDER * h
+    low = body[0] - border
     counts = np.ceil(size / h).astype(int) + 2 * _BORDER + 1
     nodes = int(np.prod(counts.astype(float)))
     finest = (float(np.prod(size)) / MAX_NODES) ** (1.0 / 3.0)
@@ -141,7 +145,7 @@ def make_grid(
     ).reshape(counts)
     # rounding moves a distance by half a quantum
     level = math.copysign(math.sqrt(offset**2 + 0.75 * h**2) + 0.5 * _QUANTUM, offset)
-    grid = DistanceGrid(low, h, values, level)
+    grid = DistanceGrid(low, h, values, level, border)
     log.info("%s: %d nodes %.3g m apart, error up to %.2g m", shape, nodes, h, grid.error(offset))
     return grid
 
@@ -185,8 +189,9 @@ def distance_grid(p: Array, q: Array) -> Evaluation:
     x, y, z = p[0] - q[0] - q[3], p[1] - q[1] - q[4], p[2] - q[2] - q[5]
     if math.isnan(x) or math.isnan(y) or math.isnan(z):
         return math.nan, math.nan, math.nan, math.nan, math.nan
-    h, ny, nz = q[6], int(q[8]), int(q[9])
-    cx, cy, cz = clamp(x, 0.0, (q[7] - 1.0) * h), clamp(y, 0.0, (q[8] - 1.0) * h), clamp(z, 0.0, (q[9] - 1.0) * h)
+    h, ny, nz, m = q[6], int(q[8]), int(q[9]), q[11]
+    x1, y1, z1 = (q[7] - 1.0) * h, (q[8] - 1.0) * h, (q[9] - 1.0) * h
+    cx, cy, cz = clamp(x, 0.0, x1), clamp(y, 0.0, y1), clamp(z, 0.0, z1)
     i, j, k = min(int(cx / h), int(q[7]) - 2), min(int(cy / h), ny - 2), min(int(cz / h), nz - 2)
     u, v, w = cx / h - i, cy / h - j, cz / h - k
     a = _FIRST + (i * ny + j) * nz + k
@@ -201,11 +206,15 @@ def distance_grid(p: Array, q: Array) -> Evaluation:
     gz = ((a0 + v * (b0 - a0)) + u * ((c0 + v * (d0 - c0)) - (a0 + v * (b0 - a0)))) / h
     ex, ey, ez = x - cx, y - cy, z - cz
     beyond = ex * ex + ey * ey + ez * ez
-    if beyond > 0.0:  # (2)
+    if beyond > 0.0:
         inner = distance
-        distance = math.sqrt(beyond + inner * inner)
+        distance = math.sqrt(beyond + inner * inner)  # (2)
         gx = (ex if ex != 0.0 else inner * gx) / distance
         gy = (ey if ey != 0.0 else inner * gy) / distance
         gz = (ez if ez != 0.0 else inner * gz) / distance
+        ex, ey, ez = x - clamp(x, m, x1 - m), y - clamp(y, m, y1 - m), z - clamp(z, m, z1 - m)
+        to_box = length3(ex, ey, ez)
+        if to_box > distance:
+            distance, gx, gy, gz = to_box, ex / to_box, ey / to_box, ez / to_box
     g = distance - q[10]
     return g, gx, gy, gz, g

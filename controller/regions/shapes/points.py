@@ -102,6 +102,8 @@ def _read_points(path: Path) -> Array:
             lines = path.read_text(encoding="utf-8-sig").replace(",", " ").replace(";", " ").splitlines()
             if lines and not _is_row(lines[0]):
                 lines = lines[1:]  # names of columns
+            if not lines:
+                raise ValueError("no rows")
             rows = np.loadtxt(lines, ndmin=2, usecols=(0, 1, 2))
         points = np.asarray(rows, dtype=float)
     except (OSError, ValueError, EOFError, MemoryError) as error:

@@ -18,7 +18,7 @@ igl = pytest.importorskip("igl", reason="the mesh extra is not installed")
 pytest.importorskip("rtree", reason="the mesh extra is not installed")
 
 
-class OneLine(Exception):
+class OneLineError(Exception):
     """A message of one line that names the file, or the grid that it would need."""
 
     def __init__(self, message):
@@ -59,7 +59,7 @@ def test_clearance_is_never_above_the_true_one_nor_much_below(name, offset, tmp_
     reported, true = clearances(shape, points), outside_distance(points, solid) - offset
     low, high = shape.bounds()
     outside, gridded = true > -offset, ((points > low) & (points < high)).all(axis=1)
-    assert (reported[outside] <= true[outside] + 1e-6).all()
+    assert np.where(true >= 0.0, reported <= true + 1e-6, reported < 0.0)[outside].all()
     # where two faces are equally near, interpolation is below the distance
     assert (reported >= true - shape.error() - math.sqrt(3.0) / 2.0 * 0.1)[outside & gridded].all()
     assert (reported[~outside] < 0.0).all()
@@ -179,11 +179,11 @@ def test_damaged_files_are_a_solid_or_one_line(tmp_path_factory, data):
             break
     path.write_bytes(content)
     shape = Mesh(str(path), "ned") if name.startswith("solid") else Points(str(path), 0.2, "ned")
-    with contextlib.suppress(OneLine):
+    with contextlib.suppress(OneLineError):
         try:
             shape.bounds()
         except RegionError as error:
-            raise OneLine(str(error)) from None
+            raise OneLineError(str(error)) from None
 
 
 @pytest.mark.parametrize(
