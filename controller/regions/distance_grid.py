@@ -71,13 +71,13 @@ class DistanceGrid(NamedTuple):
         )  # fmt: skip
 
     def bounds(self, position: tuple[float, ...]) -> Bounds:
-        """Return the corners of the grid, which hold the region."""
+        """Return the corners of the grid, which hold the region; position [m, NED]."""
         low = self.low + position
         high = low + self.spacing * (np.array(self.distances.shape) - 1)
         return tuple(low.tolist()), tuple(high.tolist())
 
     def surface(self, position: tuple[float, ...]) -> Mesh:
-        """Return the region's surface as triangles: a corner in each cell that it crosses, near the surface."""
+        """Return the region's surface as triangles: a corner in each cell that it crosses; position [m, NED]."""
         values = self.distances - self.level
         shifts = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
         cells = np.array(values.shape) - 1
