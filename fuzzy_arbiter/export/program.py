@@ -61,7 +61,7 @@ class Program:
     system: System
     lines: tuple[str, ...]  # statements that fill ``outputs`` from ``inputs``, and return a status
     defuzzifiers: dict[int, Sweep | Heights]  # by the number of the output, those that are functions of cuts
-    functions: tuple[str, ...]  # names of the functions that the statements call
+    functions: tuple[str, ...]  # names of the functions that its lines call
 
     @property
     def mathematical(self) -> bool:
@@ -90,8 +90,8 @@ def program(system: System) -> Program:
             elif isinstance(one, ClippedCurves | Quadrature) and slots:
                 defuzzifiers[k] = _heights(output, slots)
     evaluated = _closed(engine) if isinstance(engine, ClosedEngine) else _inferred(engine, defuzzifiers)
-    results = [f"outputs[{k}] = y{k + 1}" for k in range(len(system.outputs))]
-    lines = (*_inputs(system), *evaluated, *_shared(system), *results, "return 0")
+    results = [f"outputs[{k}] = y{k + 1};" for k in range(len(system.outputs))]
+    lines = (*_inputs(system), *evaluated, *_shared(system), *results, "return 0;")
     heights = [line for one in defuzzifiers.values() if isinstance(one, Heights) for line in one.lines]
     return Program(system, lines, defuzzifiers, tuple(called((*lines, *heights))))
 
@@ -111,7 +111,7 @@ def _heights(output: Output, slots: Sequence[Slot]) -> Heights:
     edges = with_crossings(smooth_panels(output.universe, shapes), shapes)
     if output.defuzzifier not in ("centroid", "bisector"):
         edges = halved(edges)
-    return Heights((*lines, "return height"), tuple(edges.tolist()))
+    return Heights((*lines, "return height;"), tuple(edges.tolist()))
 
 
 def _inputs(system: System) -> Iterator[str]:
@@ -120,8 +120,8 @@ def _inputs(system: System) -> Iterator[str]:
     for i, variable in enumerate(system.inputs, 1):
         x, (low, high) = f"x{i}", variable.universe
         edge = EDGE * (high - low)
-        valid = f"{x} == {x}" if system.outside == "clip" else f"{low - edge!r} <= {x} and {x} <= {high + edge!r}"
-        yield from choose((f"not ({valid})", [f"return {-i}"]))  # NaN too
+        valid = f"{x} == {x}" if system.outside == "clip" else f"{low - edge!r} <= {x} && {x} <= {high + edge!r}"
+        yield from choose((f"!({valid})", [f"return {-i};"]))  # NaN too
         yield assign(x, f"least(greatest({x}, {low!r}), {high!r})")
 
 
@@ -179,7 +179,7 @@ def _closed(engine: ClosedEngine) -> Iterator[str]:
             whole = smooth if (low, top) == (0.0, 1.0) else f"{low!r} + {top - low!r} * ({smooth})"
             yield assign(f"y{k}", whole, output.name)
         else:
-            yield f"cuts_{k} = ((1.0 - {h}), {h},)"
+            yield f"const double cuts_{k}[] = {{(1.0 - {h}), {h}}};"
             yield assign(f"y{k}", f"sweep_{k}(cuts_{k})", output.name)
         yield from _scaled(engine, k)
 
@@ -217,17 +217,17 @@ def _inferred(engine: Engine, defuzzifiers: dict[int, Sweep | Heights]) -> Itera
             fires = [f"r{i + 1}" for i in slot.rules] or ["0.0"]
             words = str(output[output.term_names[slot.term]])
             yield from logic.assign(cut, logic.join(output.aggregation, fires), words)
-        default = f"return {k}" if output.default is None else assign(y, repr(output.default))
+        default = f"return {k};" if output.default is None else assign(y, repr(output.default))
         yield assign(y, "0.0", output.name)
         if output.weighted:
             fired = _valued(output, k, cuts, system)
         elif isinstance(one, Heights):
             function, side = _FUNCTIONS[output.defuzzifier]
-            fired = [f"{y} = {function}(height_{k}, cuts_{k}, EDGES_{k}, {len(one.edges) - 1}, {side})"]
+            fired = [f"{y} = {function}(height_{k}, cuts_{k}, EDGES_{k}, {len(one.edges) - 1}, {side});"]
         else:
-            fired = [f"{y} = sweep_{k}(cuts_{k})"]
+            fired = [f"{y} = sweep_{k}(cuts_{k});"]
         if not output.weighted:
-            fired = [f"cuts_{k} = ({', '.join(cuts)},)", *fired]
+            fired = [f"const double cuts_{k}[] = {{{', '.join(cuts)}}};", *fired]
         points = [
             (repr(shape.parameters[0]), logic.apply(JOINS[slot.implication], cut, repr(shape.height)))
             for cut, slot in zip(cuts, slots, strict=True)
@@ -235,10 +235,10 @@ def _inferred(engine: Engine, defuzzifiers: dict[int, Sweep | Heights]) -> Itera
         ]
         if points and output.defuzzifier in ("centroid", "bisector"):  # they count where nothing has an area
             total, weight = (" + ".join(texts) for texts in ([f"{x} * {h}" for x, h in points], [h for _, h in points]))
-            fired += choose((f"not (fabs({y}) < INFINITY)", [f"{y} = quotient({total}, {weight})"]))
-        yield from choose((" or ".join(f"{cut} > 0.0" for cut in cuts), fired), ("", [default])) if cuts else [default]
+            fired += choose((f"!(fabs({y}) < INFINITY)", [f"{y} = quotient({total}, {weight});"]))
+        yield from choose((" || ".join(f"{cut} > 0.0" for cut in cuts), fired), ("", [default])) if cuts else [default]
         if not isinstance(one, Sweep):  # the value may be NaN or infinite
-            yield from choose((f"not (fabs({y}) < INFINITY)", [default]))
+            yield from choose((f"!(fabs({y}) < INFINITY)", [default]))
         if output.lock_range:
             low, high = output.universe
             yield assign(y, f"least(greatest({y}, {low!r}), {high!r})")
@@ -256,15 +256,15 @@ def _valued(output: Output, k: int, cuts: Sequence[str], system: System) -> list
     """Compute the mean of an output's values, weighted by their strengths, or the sum."""
     inputs, outputs = variable_names(system.inputs), variable_names(system.outputs[: k - 1])
     names = {name: f"x{i}" for i, name in enumerate(inputs, 1)} | {name: f"y{i}" for i, name in enumerate(outputs, 1)}
-    lines = [f"w{k} = 0.0"]
+    lines = [f"w{k} = 0.0;"]
     for j, (cut, term) in enumerate(zip(cuts, output.terms, strict=True), 1):
         if isinstance(term.shape, Value):
             cases: Cases = [("", code(term.shape.expression(inputs, outputs).tree, names))]
         else:
             cases = _position(term.shape, cut)
-        added = [f"y{k} = y{k} + {cut} * v{k}_{j}", f"w{k} = w{k} + {cut}"]
+        added = [f"y{k} = y{k} + {cut} * v{k}_{j};", f"w{k} = w{k} + {cut};"]
         lines += choose((f"{cut} > 0.0", [*assign_first(f"v{k}_{j}", cases), *added]))
-    return [*lines, f"y{k} = y{k} / w{k}"] if output.defuzzifier == "average" else lines
+    return [*lines, f"y{k} = y{k} / w{k};"] if output.defuzzifier == "average" else lines
 
 
 def _position(shape: Membership, cut: str) -> Cases:
@@ -290,4 +290,4 @@ def _shared(system: System) -> Iterator[str]:
     logic = Expressions()
     total = " + ".join(ys) if system.normalization == "sum" else logic.join("max", ys)
     yield from logic.assign("total", total)
-    yield from choose(("total > 0.0", [f"{y} = {y} / total" for y in ys]))  # if all are 0, they stay 0
+    yield from choose(("total > 0.0", [f"{y} = {y} / total;" for y in ys]))  # if all are 0, they stay 0

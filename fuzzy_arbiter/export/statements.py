@@ -1,8 +1,9 @@
-"""Statements of exported code: lines of Python whose expressions are valid in C, too."""
+"""Statements of exported code: lines of C without declarations, whose expressions are valid in Python, too."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial, reduce
 from itertools import accumulate
@@ -23,14 +24,20 @@ Cases = Sequence[tuple[str, str]]  # conditions, of which the last may be empty,
 
 def assign(name: str, expression: str, words: str = "") -> str:
     """Format an assignment, and its comment."""
-    return f"{name} = {expression}" + (f"  # {words}" if words else "")
+    return f"{name} = {expression};" + (f" /* {safe(words)} */" if words else "")
+
+
+def safe(words: str) -> str:
+    """Return words that neither begin nor end a comment, nor make a trigraph."""
+    return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", words)
 
 
 def choose(*branches: tuple[str, Iterable[str]]) -> Iterator[str]:
     """Format branches, of which the first runs whose condition holds; an empty condition always holds."""
     for i, (condition, lines) in enumerate(branches):
-        yield f"{'elif' if i else 'if'} {condition}:" if condition else "else:"
+        yield f"{'} else ' if i else ''}{f'if ({condition}) ' if condition else ''}{{"
         yield from (f"    {line}" for line in lines)
+    yield "}"
 
 
 def assign_first(name: str, cases: Cases, words: str = "") -> Iterator[str]:
