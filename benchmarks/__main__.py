@@ -26,7 +26,7 @@ from benchmarks import (
     step,
     view,
 )
-from benchmarks.autopilot.flights import Task, make_flights
+from benchmarks.autopilot.flights import OTHER, RANDOM, Task, make_flights
 from benchmarks.autopilot.simulated_link import FAULTS
 from benchmarks.machine import description
 from benchmarks.peer_environment import Environment
@@ -109,6 +109,9 @@ def _add_autopilot(verbs: Any) -> None:
     verb.add_argument("--ardusub", type=Path, required=True, metavar="FILE", help="ArduSub's program for SITL")
     verb.add_argument("--scenario", nargs="+", default=[], metavar="NAME", help="shipped ones, or random-SEED")
     verb.add_argument("--random", type=int, default=0, metavar="N", help="so many random scenes, from random-SEED on")
+    verb.add_argument(
+        "--other-set", action="store_true", help="their plant has the other published drag and added mass: other-SEED"
+    )
     verb.add_argument("--seed", type=int, default=0, help="of the first random scene (default: %(default)s)")
     verb.add_argument("--steer-by", nargs="+", choices=get_args(SteerBy), default=["sticks"], help="default: sticks")
     verb.add_argument("--sticks-by", choices=get_args(SticksBy), default="manual-control", help="default: %(default)s")
@@ -125,7 +128,8 @@ def _add_autopilot(verbs: Any) -> None:
 def _autopilot(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
     if not options.ardusub.is_file():
         parser.error(f"--ardusub: {options.ardusub} is no file, expected ArduSub's program for SITL")
-    names = [*options.scenario, *(f"random-{options.seed + i}" for i in range(options.random))]
+    prefix = OTHER if options.other_set else RANDOM
+    names = [*options.scenario, *(f"{prefix}{options.seed + i}" for i in range(options.random))]
     tasks = [
         Task(name, by, options.sticks_by, fault, options.level_dive, tuple(options.parameter))
         for name in names

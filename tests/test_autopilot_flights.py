@@ -6,6 +6,7 @@ import signal
 import subprocess
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,10 @@ from benchmarks.autopilot import flights
 from benchmarks.autopilot.flight_evaluation import clearances_at
 from benchmarks.autopilot.flights import Task
 from benchmarks.autopilot.scenes import random_scene
+from benchmarks.autopilot.simulated_link import FAULTS, SimulatedLink
 from cosim.scenario.scenario import load_scenario
+from cosim.scenario.true_vehicle import true_vehicle
+from plant_fmu import load_vehicle
 
 
 def test_random_scenes_leave_start_dive_and_goal_free_and_are_repeatable():
@@ -33,6 +37,28 @@ def test_random_scenes_leave_start_dive_and_goal_free_and_are_repeatable():
         assert 8.0 <= goal[0] - start[0] <= 12.0 and np.hypot(*scene.plant.current[:2]) <= 0.4
         assert random_scene(seed).toml() == scene.toml()
     assert min(counts) >= 6 and max(counts) <= 30 and len(counts) > 5
+
+
+def test_the_plant_of_other_scenes_has_drag_and_added_mass_that_the_law_does_not_know():
+    usual, other = (Task(f"{name}-3").load() for name in ("random", "other"))
+    assert [s.region.shape for s in usual.regions] == [s.region.shape for s in other.regions]
+    true, published = true_vehicle(other), load_vehicle("bluerov2_heavy_wu")
+    np.testing.assert_allclose(true.added_mass, published.added_mass)
+    np.testing.assert_allclose(true.quadratic_damping, published.quadratic_damping)
+    assert other.vehicle == usual.vehicle and true.buoyancy == true_vehicle(usual).buoyancy
+
+
+def test_a_pilot_of_the_benchmark_drives_and_lets_the_companion_resume():
+    link = SimulatedLink.__new__(SimulatedLink)  # without an autopilot
+    sent, link.events = [], []
+    link.clock, link.others = lambda: 7.0, SimpleNamespace(send=sent.append)
+    FAULTS["pilot drives"](link)
+    times = [time for time, _ in link.events]
+    assert times == sorted(times) and times[0] == 7.0 and times[-1] == 13.0
+    for _, event in link.events:
+        event()
+    assert {message.x for message in sent[:-1]} == {-700}
+    assert (sent[-1].command, sent[-1].param1, sent[-1].target_component) == (193, 1.0, 191)
 
 
 def test_flights_that_the_file_has_are_not_flown_again(tmp_path, monkeypatch, capsys):

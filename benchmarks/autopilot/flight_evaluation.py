@@ -97,6 +97,7 @@ def _evaluate_fault(
 ) -> dict[str, Any]:
     """Return the reaction to the fault: end of steering, mode, speeds, distance traveled, tilt, violated regions."""
     handover = events.first("held", "pilot")
+    resumed = next((time for time, state in events.states if state == "steering" and time > handover), math.inf)
     velocity = np.linalg.norm([record[f"velocity.{name}"] for name in "uvw"], axis=0)
     distance = np.cumsum(velocity) * float(np.median(np.diff(times)))
 
@@ -109,6 +110,7 @@ def _evaluate_fault(
         return round(float(times[fault + rows[0]] - events.failed_at), 2) if rows.size else None
 
     fault, modes = row_after(0.0), record["law.mode"]
+    end = row_after(resumed - events.failed_at) if math.isfinite(resumed) else -1
     pulses = np.array([record[f"law.pwm{i + 1}"] for i in range(scenario.vehicle.n_thrusters)])
     tilt = np.degrees(np.arccos(np.cos(record["attitude.roll"]) * np.cos(record["attitude.pitch"])))
     return {
@@ -119,7 +121,8 @@ def _evaluate_fault(
         "disarmed_after": first_time(record["law.armed"] == 0.0),
         "speed": [round(float(velocity[row_after(s)]), 2) for s in (0.0, 1.0, 3.0)],
         "distance_1s": round(float(distance[row_after(1.0)] - distance[fault]), 2),
-        "distance_to_end": round(float(distance[-1] - distance[fault]), 2),
+        "distance_to_end": round(float(distance[end] - distance[fault]), 2),  # or to where steering is resumed
+        "resumed": round(resumed - events.failed_at, 2) if math.isfinite(resumed) else None,
         "tilt": round(float(tilt[fault:].max()), 1),
         "violated": [
             s.region.name

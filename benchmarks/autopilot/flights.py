@@ -36,7 +36,8 @@ from cosim.sitl.law import make_pwm_law
 from cosim.sitl.sitl_link import DvlOptions, SitlLink
 from cosim.sitl.sitl_session import FlightOptions, SitlSession
 
-_RANDOM = "random-"  # prefix of random scenes, before the seed
+# prefixes of random scenes, before the seed; the plant of the second ones has the other published drag and added mass
+RANDOM, OTHER = "random-", "other-"
 RATE = 400  # Hz, rate of the autopilot's frames, that of its main loop
 PARAMETERS = Path(__file__).with_name("ardusub.parm")
 FAULT_AFTER = 5.0  # s, duration of steering before the fault
@@ -55,7 +56,7 @@ _WATER = 1023.6  # kg/m3, density of the water in ArduPilot's simulator
 class Task:
     """Definition of a flight."""
 
-    scenario: str  # name of a shipped scenario, or random-SEED
+    scenario: str  # name of a shipped scenario, or random-SEED, or other-SEED
     steer_by: str = "sticks"  # output of the companion, one of `SteerBy`
     sticks_by: str = "manual-control"  # message that carries the sticks, one of `SticksBy`
     fault: str = ""  # one of `FAULTS`, or empty
@@ -70,12 +71,13 @@ class Task:
     @property
     def is_random(self) -> bool:
         """True for a flight in a random scene; those have a DVL in place of GPS."""
-        return self.scenario.startswith(_RANDOM) and self.scenario.removeprefix(_RANDOM).isdecimal()
+        return self.scenario.startswith((RANDOM, OTHER)) and self.scenario.partition("-")[2].isdecimal()
 
     def load(self) -> Scenario:
         """Return the scenario with the flight's duration."""
         if self.is_random:
-            scenario, duration = random_scene(int(self.scenario.removeprefix(_RANDOM))), RANDOM_DURATION
+            prefix, _, seed = self.scenario.rpartition("-")
+            scenario, duration = random_scene(int(seed), f"{prefix}-" == OTHER), RANDOM_DURATION
         else:
             scenario = load_scenario(self.scenario)
             duration = DURATION.get(self.scenario, scenario.time.duration)
@@ -149,7 +151,7 @@ def _steer(task: Task, scenario: Scenario, link: SimulatedLink, events: FlightEv
         offset = companion.session.alignment.offset
         if offset is not None:
             events.offset = offset.tolist()
-        if state == "steering" and task.fault and not link.events:
+        if state == "steering" and task.fault and math.isnan(events.failed_at):
             events.failed_at = link.clock() + FAULT_AFTER
             link.events.append((events.failed_at, lambda: FAULTS[task.fault](link)))
 

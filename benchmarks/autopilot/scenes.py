@@ -11,13 +11,17 @@ from plant_fmu import load_vehicle
 
 GOAL_RADIUS = 0.5  # m
 VEHICLE = "bluerov2_heavy"
+OTHER_SET = "bluerov2_heavy_wu"  # the other published drag and added mass of that vehicle
 _FREE = 0.6  # m, minimum distance of an obstacle from the start, from the dive below it, and from the goal
 _DIVE = 0.6  # m, depth of the dive below the start
 _MOST_DRAWS = 1000  # draws of an obstacle, after which it is left out
 
 
-def random_scene(seed: int) -> Scenario:
-    """Make a random scene: spheres, a current, and a vehicle that is too light or too heavy."""
+def random_scene(seed: int, has_other_set: bool = False) -> Scenario:
+    """Make a random scene: spheres, a current, and a vehicle that is too light or too heavy.
+
+    With `has_other_set` the plant has drag and added mass of `OTHER_SET`, which the law does not know.
+    """
     # up to 30 spheres of radius 0.3 m to 0.9 m, a goal 8 m to 12 m ahead, a current of up to 0.4 m/s, |W - B| up to
     # 15 N; the DVL measures 8 times a second with a noise of 0.01 m/s
     rng = np.random.default_rng([20261125, seed])
@@ -57,4 +61,17 @@ def random_scene(seed: int) -> Scenario:
         "law": {"name": "deployable"},
         "regions": regions,
     }
+    if has_other_set:
+        table["plant"]["parameters"] |= _other_parameters()
     return validate_scenario(table, f"random-{seed}", vehicle)
+
+
+def _other_parameters() -> dict[str, float]:
+    other = load_vehicle(OTHER_SET)
+    matrix = {f"added_mass[{i + 1},{j + 1}]": float(other.added_mass[i, j]) for i in range(6) for j in range(i, 6)}
+    damping = {
+        f"{name}[{i + 1}]": float(x)
+        for name in ("linear_damping", "quadratic_damping")
+        for i, x in enumerate(getattr(other, name))
+    }
+    return matrix | damping

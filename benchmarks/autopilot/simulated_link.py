@@ -91,6 +91,20 @@ def _pilot_takes(mode: int) -> Callable[[SimulatedLink], None]:
     return take
 
 
+def _pilot_drives(link: SimulatedLink) -> None:
+    """Send sticks for 5 s, and 1 s later the command to resume, from the pilot's station."""
+    begin, m = link.clock(), dialect()
+    backward = m.MAVLink_manual_control_message(1, -700, 0, 500, 0, 0)
+    resume = m.MAVLink_command_long_message(*COMPANION, m.MAV_CMD_DO_PAUSE_CONTINUE, 0, 1, 0, 0, 0, 0, 0, 0)
+
+    def send(message: Any) -> None:
+        assert link.others is not None
+        link.others.send(message)
+
+    link.events += [(begin + 0.04 * k, lambda: send(backward)) for k in range(125)]
+    link.events.append((begin + 6.0, lambda: send(resume)))
+
+
 def _pause(link: SimulatedLink) -> None:
     system, component = COMPANION
     m = dialect().MAVLink_command_long_message(system, component, 193, 0, 0, 0, 0, 0, 0, 0, 0)
@@ -100,6 +114,7 @@ def _pause(link: SimulatedLink) -> None:
 FAULTS: dict[str, Callable[[SimulatedLink], None]] = {
     "pilot takes ALT_HOLD": _pilot_takes(2),
     "pilot takes MANUAL": _pilot_takes(19),
+    "pilot drives": _pilot_drives,
     "estimate stops": lambda link: link.lost.update({"LOCAL_POSITION_NED", "ODOMETRY"}),
     "link cut": lambda link: setattr(link, "cut", True),
     "DO_PAUSE_CONTINUE": _pause,

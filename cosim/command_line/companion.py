@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cosim.simulation.commands.sources import CommandQueue
 
 _DECIMALS = 7  # of degrees, for centimeters
-_READ_PERIOD = 0.1  # s, between two reads of a terminal from which none is possible
+_READ_PERIOD = 0.1  # s, pause after a read without input: at Ctrl-D, or in the background
 _COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 _STEER_BY, _STICKS_BY = ("sticks", "wrench", "velocity", "attitude"), ("manual-control", "rc-override")
 

@@ -131,7 +131,11 @@ def _pause_or_continue(options: argparse.Namespace, parameter: float) -> int:
             while (left := until - time.monotonic()) > 0.0:
                 for one in link.receive(left):
                     if (one.system, one.component, one.name) == (*companion, "COMMAND_ACK"):
-                        return 0 if one.message.result == m.MAV_RESULT_ACCEPTED else 1
+                        if one.message.result == m.MAV_RESULT_ACCEPTED:
+                            return 0
+                        answer = m.enums["MAV_RESULT"].get(one.message.result)
+                        name = answer.name if answer else one.message.result
+                        raise TelemetryError(f"{options.endpoint}: the companion answers {name}, expected ACCEPTED")
     raise TelemetryError(f"{options.endpoint}: no companion of system {companion[0]} answers")
 
 

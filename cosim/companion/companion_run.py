@@ -25,7 +25,7 @@ from cosim.mavlink.vehicle.speed import drag_limited_speed
 from cosim.mavlink.wire.options import ProfileName
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import Run
-from cosim.results.wording import verdict
+from cosim.results.wording import DRY_RUN, verdict
 from cosim.run.run_folder import claim, conclude
 from cosim.scenario.law_factory import require_builtin_law
 from cosim.scenario.scenario import Scenario
@@ -184,7 +184,7 @@ class Companion:
         Returns
         -------
         Run
-            Recorded run; its status is ``completed``, ``interrupted``, or the final state with its reason.
+            Recorded run; its status is ``completed``, ``dry run``, ``interrupted``, or the final state with its reason.
 
         Raises
         ------
@@ -262,6 +262,8 @@ class Companion:
         except KeyboardInterrupt:
             return "interrupted"
         state, reason = session.supervisor.state, session.supervisor.reason
+        if state == "dry_run":
+            return DRY_RUN
         return "completed" if session.supervisor.is_steering else f"{state}: {reason}"
 
     def _clearance(self, position: Array) -> float:

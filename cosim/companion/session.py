@@ -365,6 +365,8 @@ class AutopilotSession:
             return
         result = m.MAV_RESULT_UNSUPPORTED
         if message.command == m.MAV_CMD_DO_PAUSE_CONTINUE and message.param1 in (0.0, 1.0):
-            result = m.MAV_RESULT_ACCEPTED
-            self._set_takeover(message.param1 == 0.0)
+            result, is_hold = m.MAV_RESULT_DENIED, message.param1 == 0.0
+            if is_hold or not self._is_ending:
+                result = m.MAV_RESULT_ACCEPTED
+                self._set_takeover(is_hold)
         self._link.send(m.MAVLink_command_ack_message(message.command, result, 0, 0, system, component))

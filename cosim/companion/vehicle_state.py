@@ -38,6 +38,7 @@ _LOCAL_NED, _BODY_FRD = 1, 12  # MAV_FRAME
 _RELATIVE, _ABSOLUTE = 8, 16  # estimator flags: horizontal position is relative, absolute
 _DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
 _MAX_PREDICTION = 0.1  # s, of the state over its age
+_RANGE_TIMEOUT = 2.0  # s, after which the range of a silent distance sensor is forgotten
 _MILLI, _MICRO = 1e-3, 1e-6
 
 
@@ -60,6 +61,7 @@ class ReportedState:
         # absolute pressure [hPa], of the second sensor if there is one; NaN if none is reported
         self.pressure = self.battery = self.pilot_gain = math.nan
         self.ranges: dict[int, float] = {}  # m, of distance sensors, by MAV_SENSOR_ROTATION
+        self._ranged_at: dict[int, float] = {}  # our times [s] of their last messages
         self.pulses: tuple[int, ...] = ()
         self.is_leaking = self.is_reckoned = self._is_absolute = False
         self.has_origin = False  # True once the autopilot has a global origin
@@ -84,6 +86,8 @@ class ReportedState:
         self.received_at = now
         self.message_counts[name] += 1
         handler(message, now)
+        for rotation in self.ranges.keys() & {r for r, at in self._ranged_at.items() if now - at > _RANGE_TIMEOUT}:
+            del self.ranges[rotation]
 
     def age(self, now: float) -> float:
         """Return the age of the older one of position and attitude [s]; infinite before both were received."""
@@ -173,6 +177,7 @@ class ReportedState:
 
     def _receive_distance_sensor(self, m: Any, now: float) -> None:
         self.ranges.pop(m.orientation, None)
+        self._ranged_at[m.orientation] = now
         if m.min_distance <= m.current_distance <= m.max_distance:
             self.ranges[m.orientation] = m.current_distance * 0.01
 

@@ -26,8 +26,8 @@ from plant_fmu.vehicle import Vehicle
 MAX_STEP, MIN_STEP = 0.03, 0.015  # s, bounds of the integration step
 _MAX_TRANSLATION_STEP = 0.04  # s, where attitude and angular velocity are inputs: what is left is slow
 STAGES = (4.0, 20.0)  # s, lengths of windows: short ones converge from distant starts, long ones separate the numbers
-# relative decrease of the cost that ends a round: the first round, the others, the last one of a stage
-_HELD, _ROUGH, _PRECISION = 0.1, 1e-2, 1e-6
+# relative decrease of the cost that ends a round: the very first one, the others, the last one of a stage
+_FIRST_PRECISION, _ROUND_PRECISION, _LAST_PRECISION = 0.1, 1e-2, 1e-6
 _FAR = 0.03  # weight of all residuals in the first round: sampled starts are off by some 30 deviations of the noise
 _MAX_EVALUATIONS = 20  # of a round
 _ROUNDS = (3, 2)  # rounds of each stage, with new weights between them; the very first one keeps the sampled starts
@@ -136,10 +136,10 @@ def fit(
         residuals = problem.residuals
         for k in range(rounds):
             is_last, evaluations = k == rounds - 1, 0
-            precision = _PRECISION if is_last else _ROUGH
+            precision = _LAST_PRECISION if is_last else _ROUND_PRECISION
             residuals.holds_starts = not fits and k == 0
             if residuals.holds_starts:  # residuals are those of wrong starts: numbers stay near their priors
-                precision = _HELD
+                precision = _FIRST_PRECISION
                 residuals.weights = [np.full(len(w), _FAR) for w in residuals.weights]
             try:
                 values = problem.solve(values, on_evaluation, precision)

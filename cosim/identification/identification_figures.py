@@ -21,7 +21,7 @@ from plant_fmu.archive import temporary_folder
 from plant_fmu.vehicle import Vehicle
 
 _WIDTH = 7.2  # in
-_AHEAD = 5.0  # s, horizon of the predictions that are shown over time
+_LOOKAHEAD = 5.0  # s, horizon of the predictions that are shown over time
 _MAX_LAG = 20  # samples between residuals whose correlation is shown
 _MAX_SHOWN = 60  # parameters in a figure
 
@@ -60,7 +60,7 @@ _PREDICTIONS = (
     "Free-running prediction: root mean square error of the speed and the angular velocity along and about each axis, "
     "from starts that the samples give."
 )
-_COURSE = f"Velocities of a run, measured, and predicted anew every {_AHEAD:g} s from the measured state."
+_COURSE = f"Velocities of a run, measured, and predicted anew every {_LOOKAHEAD:g} s from the measured state."
 _CORRELATION = "Correlation of the numbers: these runs hardly separate two that are dark."
 _REHEARSAL = (
     "The rehearsal: where the vehicle goes, with the numbers as they are known before. Gray: segments; between them "
@@ -152,11 +152,11 @@ def _predictions(predictions: Sequence[Prediction]) -> Figure:
 
 def velocity_course(log: Log, fit: Fit, vehicle: Vehicle) -> Figure | None:
     """Draw measured and predicted velocities of a run; None if there are none."""
-    times, measured, predicted = predicted_samples(log, fit, vehicle, _AHEAD)
+    times, measured, predicted = predicted_samples(log, fit, vehicle, _LOOKAHEAD)
     if not len(times):
         return None
     figure, panels = _panels(3, 1.2, sharex=True)
-    breaks = np.flatnonzero(np.diff((times - times[0]) // _AHEAD)) + 1
+    breaks = np.flatnonzero(np.diff((times - times[0]) // _LOOKAHEAD)) + 1
     for axes, component, x, y in zip(panels, AXES["velocity"], measured.T, predicted.T, strict=True):
         axes.plot(times, x, ".", color=BLUE, markersize=3, label="measured")
         axes.plot(np.insert(times, breaks, np.nan), np.insert(y, breaks, np.nan), color=ORANGE, label="predicted")

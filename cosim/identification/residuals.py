@@ -25,6 +25,7 @@ from plant_fmu.vehicle import Vehicle
 
 _START_DEVIATIONS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0)  # m, rad, m/s, rad/s
 _TURNS = ("attitude", "angular_velocity")  # topics that may be inputs
+_MOTION_KINDS = ("plant", "lag", "thrust", "asymmetry", "phase", "current", "force", "trim")
 _FORCES = range(12, 15)  # indices of a window's force behind those of its state
 _FORCE = 0.5  # N, standard deviation of a random force before any residual is known
 _MIN_FORCE = 0.01  # N
@@ -102,7 +103,7 @@ class Residuals:
         window = self.windows[i]
         setting = settings[window.run]
         inside = slice(window.first, window.first + window.steps)
-        moving = [j for j, p in enumerate(self.parameters) if full and self._moves(p, window.run)]
+        moving = [j for j, p in enumerate(self.parameters) if full and self._changes_motion(p, window.run)]
         n, residuals, starts, rows = len(self._starts), [], [], []
         for topic, sampled, along in self._sampled(i, setting, start, self._directions(moving, setting, inside, start)):
             residuals.append(measurements.residual(topic, sampled.states, setting.errors).ravel())
@@ -194,18 +195,9 @@ class Residuals:
         return result
 
     @staticmethod
-    def _moves(p: Parameter, run: int) -> bool:
+    def _changes_motion(p: Parameter, run: int) -> bool:
         """Return True if a parameter changes the motion of a run, and not only its measurements."""
-        return p.run in (None, run) and p.kind in (
-            "plant",
-            "lag",
-            "thrust",
-            "asymmetry",
-            "phase",
-            "current",
-            "force",
-            "trim",
-        )
+        return p.run in (None, run) and p.kind in _MOTION_KINDS
 
     def _directions(self, moving: Sequence[int], setting: Setting, inside: slice, start: Array) -> Directions:
         n, count = len(self._starts), len(self._starts) + len(moving)

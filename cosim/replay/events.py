@@ -18,7 +18,7 @@ from cosim.results.law_reports import ISOLATED, REJECTED, Isolations, rejects
 from cosim.results.record import Rows
 from cosim.results.run_result import Run
 from cosim.results.spans import Flags, Span, Spans
-from cosim.results.wording import IMPORTED, isolation_text
+from cosim.results.wording import DRY_RUN, IMPORTED, isolation_text
 from cosim.scenario.sensor_suite import SENSOR_NAMES
 from cosim.simulation.signals import Array
 
@@ -179,6 +179,7 @@ def _end(run: Run) -> Event:
         "reset": "The run was reset",
         "killed": "The run was killed: its record ends here",
         IMPORTED: "End of the log",
+        DRY_RUN: "End of the dry run",
     }
     return Event(run.record.value("time", -1), "end", words.get(status, f"The run {status}"))
 

@@ -10,6 +10,7 @@ from controller.regions.shape import Shape
 from cosim.scenario.scenario import Scenario
 
 IMPORTED = "imported"  # status of a run that was imported from a log
+DRY_RUN = "dry run"  # status of a companion's run that sent nothing
 _MAX_LISTED = 6  # maximum number of isolations that a sentence lists
 _SAME_DRAG = (0.6, 1.7)  # estimated drags, relative to the file, between which a sentence leaves them out
 _FEW_REJECTED = 0.005  # fraction of rejected samples below which a sentence leaves them out
@@ -82,6 +83,7 @@ def verdict(summary: dict[str, Any]) -> str:
         force = f" The law asked for up to {commanded}; what acted was not measured."
     ending = {
         "completed": "",
+        DRY_RUN: " It was a dry run: nothing was sent.",
         "interrupted": f" The run was interrupted at {summary['simulated_time']:.3f} s.",
         "reset": f" The run was reset at {summary['simulated_time']:.3f} s.",
         "killed": f" The run was killed; its record ends at {summary['simulated_time']:.3f} s.",

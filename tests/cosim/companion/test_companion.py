@@ -22,6 +22,7 @@ from cosim.live.live_view import LiveView
 from cosim.mavlink.wire.options import ORIGIN
 from cosim.mavlink.wire.thrust_body import get_thrust_body
 from cosim.results.run_result import load_run
+from cosim.results.wording import verdict
 from cosim.run.run_folder import report_again
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands.commands import Arm
@@ -263,7 +264,8 @@ def test_dry_run_sends_no_setpoints_and_only_message_requests(tmp_path, link, en
     """Nor when something ends it."""
     events = [lambda: link.silent.add("LOCAL_POSITION_NED")] if ends else ()
     flight = Flight(tmp_path, 4.0, dry_run=True, events=events, link=link)
-    assert flight.status == ("held: stale estimate" if ends else "completed")
+    assert flight.status == ("held: stale estimate" if ends else "dry run")
+    assert verdict(flight.run.summary).endswith("It was a dry run: nothing was sent.") == (not ends)
     assert flight.states[-1][1] == ("held" if ends else "dry_run")
     assert not link.of_type(*STICKS) and {m.command for m in link.of_type("COMMAND_LONG")} == {511}
     assert np.abs(flight.run.table()["stick.Y"].to_numpy()).max() > 0.05  # what it would have sent
@@ -536,12 +538,12 @@ def test_each_station_that_competes_or_is_ignored_is_warned_of_once(
 
 @pytest.mark.medium
 @pytest.mark.parametrize(
-    ("system", "routed", "warning", "min_way", "max_way"),
+    ("system", "routed", "warning", "min_distance", "max_distance"),
     [(255, False, COMPETES.format(255), 3.0, 10.0), (255, True, COMPETES.format(255), 3.0, 10.0),
      (250, False, IGNORED, 0.0, 1.5)],
 )  # fmt: skip
 def test_a_pilot_drives_away_by_sticks_of_the_system_that_the_autopilot_obeys(
-    tmp_path, caplog, system, routed, warning, min_way, max_way
+    tmp_path, caplog, system, routed, warning, min_distance, max_distance
 ):
     """One of another system, whose sticks an ArduSub ignores, is warned of before the vehicle is armed."""
     link, begun = StandIn(profile="ardusub", shift=SHIFT, armed=False, obeys=255, routed=routed), 6.0
@@ -557,7 +559,7 @@ def test_a_pilot_drives_away_by_sticks_of_the_system_that_the_autopilot_obeys(
     (warned_at,) = [k for k, (_, m) in enumerate(link.sent) if m.get_type() == "STATUSTEXT" and "station" in m.text]
     (armed_at, *_) = [k for k, (_, m) in enumerate(link.sent) if m.get_type() == "COMMAND_LONG" and m.command == 400]
     way = np.array([link.column(f"position.{axis}")[round(begun / link.step) :] for axis in "xyz"])
-    assert warned_at < armed_at and min_way < np.linalg.norm(way[:, -1] - way[:, 0]) < max_way
+    assert warned_at < armed_at and min_distance < np.linalg.norm(way[:, -1] - way[:, 0]) < max_distance
 
 
 @pytest.mark.medium

@@ -632,11 +632,17 @@ def test_a_verb_lets_a_companion_hold_and_resume(capsys):
                 assert main(["mavlink", verb, f"udpout:127.0.0.1:{port}", "--system-id", "7"]) == 0
                 assert session._taken_over == is_held
             assert main(["mavlink", "resume", f"udpout:127.0.0.1:{port}"]) == 2
+            session._is_ending = True
+            assert main(["mavlink", "resume", f"udpout:127.0.0.1:{port}", "--system-id", "7"]) == 2
             assert session._taken_over
         finally:
             over.set()
             thread.join()
-    assert capsys.readouterr().err == f"cosim: udpout:127.0.0.1:{port}: no companion of system 255 answers\n"
+    where = f"cosim: udpout:127.0.0.1:{port}"
+    assert capsys.readouterr().err.splitlines() == [
+        f"{where}: no companion of system 255 answers",
+        f"{where}: the companion answers MAV_RESULT_DENIED, expected ACCEPTED",
+    ]
 
 
 def test_sticks_of_six_thrusters_command_every_axis_but_pitch():

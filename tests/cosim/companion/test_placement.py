@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.companion.companion_options import CompanionOptions
 from cosim.companion.companion_run import Companion
 from cosim.companion.frame_alignment import SceneOrigin
 from cosim.companion.placement import MAX_DISTANCE, Placement
+from cosim.companion.vehicle_state import ReportedState
 from cosim.errors import RunError
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.wire.options import ORIGIN
@@ -121,6 +123,22 @@ def test_the_pool_whose_scene_is_for_the_center_of_the_vehicle_fits(north, monke
     position, level = np.array([north, 1.5, 0.3]), np.array([1.0, 0.0, 0.0, 0.0])
     assert placement.contradictions(position, level, ranges) == {} and len(counts) < 400
     assert [*placement.contradictions(position, level, ranges | {25: 0.9, 2: 3.3})] == [2, 25]
+
+
+def test_the_range_of_a_silent_sensor_is_forgotten():
+    state = ReportedState()
+
+    def receive(name, at, **fields):
+        state.receive(1, 1, getattr(mavlink, f"MAVLink_{name}_message")(**fields), at)
+
+    beat = {"type": 12, "autopilot": 3, "base_mode": 0, "custom_mode": 0, "system_status": 3, "mavlink_version": 3}
+    sensor = {"time_boot_ms": 0, "min_distance": 5, "max_distance": 5000, "type": 1, "id": 0, "covariance": 0}
+    receive("heartbeat", 0.0, **beat)
+    receive("distance_sensor", 0.0, current_distance=180, orientation=25, **sensor)
+    receive("distance_sensor", 1.5, current_distance=300, orientation=0, **sensor)
+    assert state.ranges == {25: 1.8, 0: 3.0} and state.altitude == 1.8
+    receive("heartbeat", 2.1, **beat)
+    assert state.ranges == {0: 3.0} and np.isnan(state.altitude)
 
 
 @pytest.mark.medium
