@@ -47,8 +47,11 @@ RANDOM_DURATION = 45.0  # s, duration of a flight in a random scene
 _LOWERED = 12.0  # s, time of the plant at which the vehicle is at its start
 _LONGEST = 400.0  # s, duration of the plant's scenario
 _PATIENCE = 120.0  # s of the wall clock without a frame, after which a flight ends
-# parameters of ArduSub for a DVL in place of GPS
-_WITHOUT_GPS = {"VISO_TYPE": 1, "EK3_SRC1_VELXY": 6, "EK3_SRC1_POSXY": 0, "EK3_SRC1_VELZ": 0, "GPS1_TYPE": 0}
+# parameters of ArduSub for a DVL in place of GPS, whose name was the last one before 4.6
+_WITHOUT_GPS = {
+    "VISO_TYPE": 1, "EK3_SRC1_VELXY": 6, "EK3_SRC1_POSXY": 0, "EK3_SRC1_VELZ": 0,
+    "GPS1_TYPE": 0, "GPS_TYPE": 0,
+}  # fmt: skip
 _WATER = 1023.6  # kg/m3, density of the water in ArduPilot's simulator
 
 
