@@ -54,7 +54,7 @@ def test_a_pilot_of_the_benchmark_drives_and_lets_the_companion_resume():
     link.clock, link.others = lambda: 7.0, SimpleNamespace(send=sent.append)
     FAULTS["pilot drives"](link)
     times = [time for time, _ in link.events]
-    assert times == sorted(times) and times[0] == 7.0 and times[-1] == 13.0
+    assert times == sorted(times) and times[0] == 7.0 and times[-1] == 15.0
     for _, event in link.events:
         event()
     assert {message.x for message in sent[:-1]} == {-700}

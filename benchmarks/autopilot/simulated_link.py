@@ -92,7 +92,7 @@ def _pilot_takes(mode: int) -> Callable[[SimulatedLink], None]:
 
 
 def _pilot_drives(link: SimulatedLink) -> None:
-    """Send sticks for 5 s, and 1 s later the command to resume, from the pilot's station."""
+    """Send sticks for 7 s, and 1 s later the command to resume, from the pilot's station."""
     begin, m = link.clock(), dialect()
     backward = m.MAVLink_manual_control_message(1, -700, 0, 500, 0, 0)
     resume = m.MAVLink_command_long_message(*COMPANION, m.MAV_CMD_DO_PAUSE_CONTINUE, 0, 1, 0, 0, 0, 0, 0, 0)
@@ -101,8 +101,8 @@ def _pilot_drives(link: SimulatedLink) -> None:
         assert link.others is not None
         link.others.send(message)
 
-    link.events += [(begin + 0.04 * k, lambda: send(backward)) for k in range(125)]
-    link.events.append((begin + 6.0, lambda: send(resume)))
+    link.events += [(begin + 0.04 * k, lambda: send(backward)) for k in range(175)]
+    link.events.append((begin + 8.0, lambda: send(resume)))
 
 
 def _pause(link: SimulatedLink) -> None:
