@@ -140,6 +140,7 @@ class CompiledLaw:
     function: ClassVar[Any]  # plain Python in the translator's subset, or anything that can be called
     gains_type: ClassVar[type[Any]]  # a NamedTuple of floats with defaults
     above_zero: ClassVar[tuple[str, ...]] = ()  # gains that must not be 0
+    takes_speed: ClassVar[bool] = False  # True if it keeps to `speed_limit` of its memory
     diagnostics: tuple[Diagnostic, ...] = ()
     gains: Any
     memory: Any
@@ -221,6 +222,17 @@ class CompiledLaw:
         return desired
 
     @property
+    def attitude_target(self) -> Array:
+        """Attitude that a mission may write before each step, and turns steadily: shape (4,), as desired."""
+        return self.desired_quaternion
+
+    @property
+    def speed_limit(self) -> Array:
+        """Greatest speed to aim at [m/s], shape (), which a mission may write before each step."""
+        limit: Array = self.memory.storage("speed_limit")
+        return limit
+
+    @property
     def estimate(self) -> Array:
         """phi-hat (12), shape (4,) [N, N m]."""
         estimate: Array = self.memory.estimate
@@ -282,6 +294,7 @@ class LawMemory(State):
 
     desired_quaternion: Vector4
     period: float  # s
+    speed_limit: float = math.inf  # m/s, greatest to aim at; laws with `takes_speed` keep to it
     estimate: Vector4  # phi-hat [N, N m]; zeros of a law that estimates nothing
     report: Nothing
 

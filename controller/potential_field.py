@@ -56,12 +56,19 @@ def write_set_point_wrench(
     # with gains that have limit, inset, repulsion, reach, k_p1, k_p2, k_v1 and k_v2
     field = memory.field
     evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
-    set_point_error(field, gains.inset, gains.limit / gains.k_p1)
+    set_point_error(field, gains.inset, max_pull(gains, memory.speed_limit) / gains.k_p1)
     e_att = error(memory.desired_quaternion, state.quaternion)[1:]  # (23)
     forces[:] = damping(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2)
     forces[:3] -= gains.k_p1 * (R.T @ field.error)
     forces[:3] += R.T @ field.push
     return e_att
+
+
+def max_pull(gains: Any, speed: float) -> float:
+    """Return the greatest pull to the set point [N]: at a speed [m/s], damping alone is as strong."""
+    limit: float = gains.limit
+    by_speed: float = gains.k_v1 * speed  # NaN without damping
+    return by_speed if by_speed < limit else limit
 
 
 def write_drive(

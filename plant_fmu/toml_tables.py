@@ -131,9 +131,9 @@ def table_in(annotation: Any) -> tuple[type[Table] | None, bool]:
     for kind, _ in types_in(annotation):
         items = typing.get_args(kind)
         listed = typing.get_origin(kind) is tuple and len(items) == 2 and items[1] is Ellipsis
-        item = items[0] if listed else kind
-        if isinstance(item, type) and issubclass(item, Table):
-            return item, listed
+        for item, _ in types_in(items[0] if listed else kind):
+            if isinstance(item, type) and issubclass(item, Table):
+                return item, listed
     return None, False
 
 

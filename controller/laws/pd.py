@@ -52,6 +52,7 @@ class PdLaw(WrenchLaw):
     memory_type = PotentialMemory
     gains_type = PdGains
     above_zero = ("k_p1",)
+    takes_speed = True
 
 
 LAW = PdLaw

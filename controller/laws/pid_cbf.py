@@ -47,7 +47,7 @@ from controller.law import (
 from controller.laws.deployable import model
 from controller.laws.deployable.barrier import RegionObservation, add_row, observe_gradient, observe_regions
 from controller.laws.deployable.model import Dynamics, Thrusters
-from controller.potential_field import Field, evaluate_field, set_point_error
+from controller.potential_field import Field, evaluate_field, max_pull, set_point_error
 from controller.quadratic_program import Workspace
 from controller.quaternion import error, rotation_matrix
 from controller.regions.region_set import PackedRegions
@@ -107,7 +107,7 @@ def step(
     still = model.Loads(zeros(3), 0.0, zeros(3), 0.0, 1.0)
     free = model.free_acceleration(dynamics, R, velocity[:3], velocity[3:], still) + memory.disturbance
     evaluate_field(state._replace(position=memory.position), goal, regions, gains.repulsion, gains.reach, field)
-    set_point_error(field, gains.inset, gains.limit / gains.k_p1)
+    set_point_error(field, gains.inset, max_pull(gains, memory.speed_limit) / gains.k_p1)
     e_att = error(memory.desired_quaternion, state.quaternion)[1:]  # (23)
     inertia = array(dynamics.mass[3, 3], dynamics.mass[4, 4], dynamics.mass[5, 5])
     force = -gains.k_p1 * field.error - gains.k_v1 * velocity[:3] + field.push - mass * memory.disturbance[:3]
@@ -183,6 +183,7 @@ class PidCbfLaw(CompiledLaw):
     function = staticmethod(step)
     gains_type = PidCbfGains
     above_zero = ("k_p1", "observer", "pull_in", "brake")
+    takes_speed = True
 
     def __init__(
         self, vehicle: VehicleModel, gains: PidCbfGains, desired_quaternion: Array, period: float, n_regions: int

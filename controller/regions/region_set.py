@@ -108,6 +108,18 @@ def shape_entry(shape: Shape) -> Entry:
     return ENTRIES[name_of(shape)]
 
 
+def shape_center(shape: Shape) -> Vector3:
+    """Return the center of a shape, the point [m, NED] by which targets are placed."""
+    center = shape_entry(shape).center
+    if center is not None:
+        return center(shape)
+    middle = [0.0, 0.0, 0.0]
+    for axis, (low, high) in enumerate(zip(*shape.bounds(), strict=True)):
+        ends = [end for end in (low, high) if math.isfinite(end)]
+        middle[axis] = sum(ends) / len(ends) if ends else 0.0
+    return middle[0], middle[1], middle[2]
+
+
 def of_attitude(shape: Shape) -> bool:
     """Return True if a shape depends on attitude, so that its clearance is in rad instead of m."""
     return shape.kind >= FIRST_OF_ATTITUDE

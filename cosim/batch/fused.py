@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.compiling.function import BoundCall
-from cosim.batch.outcome import OUTCOME, BatchResult, empty_outcomes
+from cosim.batch.outcome import OUTCOME, BatchResult, arrivals_of, empty_outcomes
 from cosim.batch.variation import Variation
 from cosim.errors import RunError, ScenarioError
 from cosim.results.record import Rows
 from cosim.results.spans import SETTLED_FOR
 from cosim.scenario.law_factory import law_of, require_builtin_law
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.start_values import start_values
+from cosim.scenario.true_vehicle import start_values
 from cosim.simulation.bindings import BoundLaw, bind_rules
 from cosim.simulation.columns import columns_of
 from cosim.simulation.fmu_law import FmuLaw
@@ -51,14 +51,15 @@ class FusedFlyer:
 
     def fly(self, values: Array, seeds: NDArray[np.int64]) -> BatchResult:
         """Fly a batch; values (rows, keys), seeds (rows,)."""
-        outcomes, refused = empty_outcomes(len(seeds)), {}
+        outcomes, refused, arrivals = empty_outcomes(len(seeds)), {}, {}
         for row, (row_values, seed) in enumerate(zip(values, seeds, strict=True)):
             try:
                 scenario = self.variation.scenario(row_values.tolist(), int(seed))
-                outcomes[row] = self.fly_one(scenario)[0]
+                metrics, model, data, _ = fly_scenario(self._plant, scenario, law=self._law)
+                outcomes[row], arrivals[row] = _outcome(metrics, model, data), arrivals_of(data.arrivals)
             except (ScenarioError, PlantError) as error:
                 refused[row] = str(error)
-        return BatchResult(outcomes, refused)
+        return BatchResult(outcomes, refused, arrivals)
 
     def fly_one(self, scenario: Scenario, trace: bool = False) -> tuple[NDArray[np.void], Rows]:
         """Fly one scenario of the variation; return its outcome, shape (), and its signals at each control step."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -37,6 +39,7 @@ FIELDS: dict[str, tuple[type, str, str]] = {
 
 OUTCOME = np.dtype([(name, kind) for name, (kind, _, _) in FIELDS.items()])
 
+Arrivals = tuple[float | None, ...]
 Outcomes = NDArray[Any]  # items of type OUTCOME
 
 
@@ -46,6 +49,18 @@ class BatchResult:
 
     outcomes: Outcomes  # (rows,); false and NaN in refused rows
     refused: dict[int, str] = field(default_factory=dict)  # reason of scenario or plant, by row in the batch
+    # s, first time within the goal at each of its places, by row; None: never
+    arrivals: dict[int, Arrivals] = field(default_factory=dict)
+
+
+def arrivals_of(times: NDArray[np.float64]) -> Arrivals:
+    """Return arrival times [s], with None for NaN."""
+    return tuple(None if math.isnan(time) else time for time in times.tolist())
+
+
+def arrivals_text(arrivals: Arrivals) -> str | None:
+    """Format arrival times [s] for a table as JSON, null for never; None for a goal with one place."""
+    return json.dumps(arrivals) if len(arrivals) > 1 else None
 
 
 def empty_outcomes(rows: int) -> Outcomes:

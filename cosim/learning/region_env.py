@@ -29,7 +29,7 @@ from cosim.learning.control_period import (
 )
 from cosim.scenario.law_factory import law_of, require_builtin_law
 from cosim.scenario.scenario import Scenario, load_scenario
-from cosim.scenario.start_values import start_values
+from cosim.scenario.true_vehicle import start_values
 from cosim.simulation.bindings import BoundLaw, bind_rules
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.make_step import NoiseSource, exchanged_variables, make_data, make_model, step_signals

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from controller.regions import Sphere
+from controller.regions.region_set import shape_center
 from controller.regions.shape import Shape
 from cosim.errors import CommandError
 from cosim.live.command_desk import CommandDesk
@@ -24,7 +25,6 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import AddObstacle, ChangeSetting, Command, ManualControl, RemoveObstacle
 from cosim.simulation.commands.obstacle_slots import ObstacleSlots
 from cosim.simulation.commands.sources import CommandQueue
-from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array, Column
 
 log = logging.getLogger(__name__)

@@ -14,6 +14,7 @@ _GREATEST = {
     "rad": math.pi / 2.0,
     "rad/s": math.pi,
 }  # greatest usual value, by unit: 90 degrees, 180 degrees per second
+_AROUND = (".heading", ".bearing")  # keys of angles up to a full turn
 _TABLES = ("initial.velocity", "goal", "regions", "law.gains", "criteria", "plant.parameters")
 
 
@@ -23,7 +24,8 @@ def angle_findings(scenario: Scenario) -> Iterator[Finding]:
         if not key.startswith(_TABLES) or not math.isfinite(value):
             continue
         unit = key_name(key, scenario.table, scenario.vehicle).unit
-        if abs(value) > _GREATEST.get(unit, math.inf):
+        greatest = _GREATEST.get(unit, math.inf) * (4.0 if key.endswith(_AROUND) else 1.0)
+        if abs(value) > greatest:
             degrees = unit.replace("rad", "degrees")
             text = (
                 f"{key} is {value:g} {unit}, which is {math.degrees(value):.4g} {degrees}. If {value:g} {degrees} are "

@@ -12,6 +12,7 @@ from controller.laws.deployable.path_planning.search import line_margin
 from controller.regions import Mesh, Points, Region
 from controller.regions.region_set import evaluate_at_pose, of_attitude
 from cosim.precheck.finding import Finding, status
+from cosim.precheck.mission_check import mission_findings
 from cosim.precheck.path_search import SearchedPath, find_path, path_limits
 from cosim.precheck.region_intersection import Overlap, box_about, box_within, search
 from cosim.results.water_surface import heights_above_surface, is_submerged_model
@@ -36,9 +37,7 @@ def region_findings(scenario: Scenario) -> Iterator[Finding]:
     yield from _common(goal, placed, low, high, moving)
     yield from _between(placed, low, high)
     yield _path(scenario, [r for r in placed if r not in violated], [r.name for r in violated])
-    if scenario.goal_then:
-        text = f"The goal's next {len(scenario.goal_then)} places are not checked: the findings are for the first."
-        yield Finding("regions", "next places", "note", text)
+    yield from mission_findings(scenario, placed)
 
 
 def _grids(regions: Sequence[Region]) -> Iterator[Finding]:

@@ -49,6 +49,7 @@ def events_of(run: Run, log: Log) -> list[Event]:
     commands = [Event(time, "command", text) for time, text in command_events(log, step, _MAX_EVENTS)]
     events = [
         *commands,
+        *_arrivals(run),
         *_goal(run),
         *_violations(run),
         *_active(run),
@@ -59,6 +60,12 @@ def events_of(run: Run, log: Log) -> list[Event]:
         *_saturation(run),
     ]
     return [*sorted(events, key=lambda event: event.time), *_goal_miss(run), _end(run)]
+
+
+def _arrivals(run: Run) -> Iterator[Event]:
+    for name, time in run.summary.get("goals", {}).get("arrivals", {}).items():
+        if time is not None:
+            yield Event(time, "goal", f"Reaches {name} of the goal")
 
 
 def _goal(run: Run) -> Iterator[Event]:

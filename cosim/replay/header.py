@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from controller.regions.region_set import name_of, of_attitude, shape_entry, surface_of
+from controller.regions.region_set import name_of, of_attitude, shape_center, shape_entry, surface_of
 from controller.regions.shape import Bounds, Shape
 from cosim.results.region_colors import colors_of_regions
 from cosim.results.wording import describe_task
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import Mode
-from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Column
 from fuzzy_arbiter import System
 from plant_fmu import Vehicle
@@ -103,14 +102,15 @@ def _region(scenario: Scenario, index: int, limits: Bounds) -> dict[str, Any]:
         "is_dynamic": secondary.is_dynamic if secondary else not scenario.has_goal,
         "unit": "rad" if of_attitude(region.shape) else "m",  # of its clearance
         "shape": shape_of(region.shape, limits),
-        **({"places": _goal_places(scenario)} if scenario.goal_then and not secondary else {}),
+        **({} if secondary or not scenario.goal_then else _goal_places(scenario)),
     }
 
 
-def _goal_places(scenario: Scenario) -> list[list[float]]:
-    """Return the shifts of the goal from its shape's position to each of its places in turn [m, NED]."""
+def _goal_places(scenario: Scenario) -> dict[str, Any]:
+    """Return the shifts of the goal to each of its places in turn [m, NED], and their names."""
     center = shape_center(scenario.goal)
-    return [[0.0] * 3, *(np.subtract(place, center).tolist() for place in scenario.goal_then)]
+    shifts = [[0.0] * 3, *(np.subtract(place, center).tolist() for place in scenario.goal_then)]
+    return {"places": shifts, "stops": scenario.mission.stops}
 
 
 def _words(rule: str) -> str:

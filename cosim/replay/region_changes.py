@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.regions import Sphere
+from controller.regions.region_set import shape_center
 from controller.regions.shape import Bounds, Shape
 from cosim.errors import CommandError
 from cosim.replay.header import limits_of, shape_of
@@ -30,7 +31,6 @@ from cosim.simulation.commands.commands import (
 from cosim.simulation.commands.mission_executor import passed_items
 from cosim.simulation.commands.settings import LiveSettings
 from cosim.simulation.commands.sources import read_log
-from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array
 
 Log = Sequence[tuple[int, Command]]  # each command with the step at which it was applied

@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from controller.regions import Sphere
+from controller.regions.region_set import shape_center
 from cosim.results.record import Rows
 from cosim.scenario.region_tables import PARKED_POSITION, SecondaryRegion
 from cosim.scenario.scenario import Scenario
-from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array
 
 

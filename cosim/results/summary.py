@@ -59,7 +59,13 @@ def summarize(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "settle_time": visits[-1].start if visits else None,
         "final_position": [last[name] for name in _POSITION],
         **(
-            {"goals": {"reached": int(last["goal.place"]), "of": len(scenario.goal_then) + 1}}
+            {
+                "goals": {
+                    "reached": int(last["goal.place"]),
+                    "of": len(scenario.mission.stops),
+                    "arrivals": data.arrivals,
+                }
+            }
             if scenario.goal_then
             else {}
         ),
@@ -125,6 +131,8 @@ class _SummaryData:
             *(name for name in (ISOLATED, REJECTED, DRAG) if name in record.units),
         ]  # fmt: skip
         self._last_place = len(scenario.goal_then)
+        # s, first time within the goal at each of its places; None: not yet
+        self.arrivals: dict[str, float | None] = dict.fromkeys(scenario.mission.stops)
         # rows with acting forces that are left: the forces of a complete run's last row do not act
         self._acting = math.ceil(scenario.steps / max(1, round(period / scenario.time.step)))
         # fmin and fmax ignore NaN
@@ -153,6 +161,7 @@ class _SummaryData:
         """Add the next rows."""
         time, goal = block["time"], block["goal.clearance"]
         if self._last_place:
+            self._update_arrivals(time[goal >= 0.0], block["goal.place"][goal >= 0.0])
             goal = np.where(block["goal.place"] == self._last_place, goal, np.nan)
         for span in self.inside.add(goal >= 0.0, time):
             self._visits = [*self._visits[:1], span]
@@ -186,6 +195,14 @@ class _SummaryData:
             known = block[DRAG][np.isfinite(block[DRAG])]  # a law without measurements has no estimate
             last[DRAG] = float(known[-1]) if known.size else self.last.get(DRAG, np.nan)
         self.last = last
+
+    def _update_arrivals(self, time: Array, place: Array) -> None:
+        """Note when the vehicle first was within the goal at each of its places."""
+        places, rows = np.unique(place, return_index=True)
+        names = [*self.arrivals]
+        for index, row in zip(places.astype(int), rows, strict=True):
+            if self.arrivals[names[index]] is None:
+                self.arrivals[names[index]] = float(time[row])
 
     @staticmethod
     def _update_extremes(known: dict[str, float], extreme: np.ufunc, signals: dict[str, Array]) -> None:

@@ -68,7 +68,10 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
         item = next((r for r in regions if r["name"] == rest[0]), None) or regions[int(rest[0])]
         return _region_key_name(item["name"], item, rest[1:])
     if head == "goal" and rest:
-        own = rest[0] in ("velocity", "streamed", "then", "stay")
+        if rest[0] == "then" and len(rest) > 2 and not rest[2].isdecimal():
+            entry, name = table["goal"]["then"][int(rest[1])], f"the goal's next place {rest[1]}"
+            return _region_key_name(name, entry, rest[2:], "goal.then[]")
+        own = f"goal.{rest[0]}" in KEYS
         return _region_key_name("the goal", table["goal"] | {"shape": table["goal"]}, rest if own else ["shape", *rest])
     if head in ("failures", "outages") and len(rest) == 2:
         return KeyName(f"{rest[1]} of {head[:-1]} {rest[0]}", KEYS[f"{head}[].{rest[1]}"].unit)
@@ -85,18 +88,22 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
     return KeyName(_WORDS.get(key, key.replace(".", " ").replace("_", " ")), unit)
 
 
-def _region_key_name(name: str, region: dict[str, Any], path: list[str]) -> KeyName:
-    """Return the name of a key of a region or of its shape."""
+def _region_key_name(name: str, region: dict[str, Any], path: list[str], table: str = "regions[]") -> KeyName:
+    """Return the name of a key of a region, of its shape, or of another table."""
     if path[0] == "shape" and len(path) > 1:
         _, key, *indices = path
         value, unit = region["shape"].get(key), unit_of_shape(region["shape"]["type"], key)
     else:
         key, *indices = path
-        of = KEYS.get(f"regions[].{key}") or KEYS[f"goal.{key}"]
+        of = KEYS.get(f"{table}.{key}") or KEYS[f"goal.{key}"]
         value, unit = region.get(key), of.unit
     words = key.replace("_", " ")
-    if len(indices) == 2:  # a corner or point of several
-        words, value, indices = f"{words.removesuffix('s')} {indices[0]}", value[int(indices[0])], indices[1:]
+    if len(indices) == 2 or key == "rings":  # of several
+        words, value, indices = (
+            f"{words.removesuffix('s')} {indices[0]}" if indices else words,
+            value[int(indices[0])] if indices else value,
+            indices[1:],
+        )
     if indices:
         words += f" {_AXES.get(len(value), 'xy')[int(indices[0])]}"
     return KeyName(f"{words} of {name}", unit)

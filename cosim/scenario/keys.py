@@ -14,7 +14,7 @@ import msgspec
 
 from controller import LAWS
 from controller.regions.shapes import ENTRIES
-from cosim.scenario.region_tables import GoalMotion
+from cosim.scenario.goal_mission import GoalMotion
 from cosim.scenario.tables import File
 from plant_fmu.errors import PlantFmuError
 from plant_fmu.toml_tables import Table, fields_of, table_in, types_in

@@ -92,19 +92,6 @@ else:
     AnyShape = Union[tuple(_shape_table(kind) for kind in ENTRIES)]  # noqa: UP007
 
 
-class GoalMotion(Table, frozen=True):
-    """Keys of the goal beside those of its shape."""
-
-    velocity: Annotated[
-        Vector3, key("velocity of the goal, north east down", "m/s", "; as `regions[].velocity`")
-    ] = (0.0, 0.0, 0.0)  # fmt: skip
-    streamed: Annotated[bool, key("moved from outside during the run", more="; as `regions[].streamed`")] = False
-    then: Annotated[
-        tuple[Vector3, ...], key("next centers of the goal in turn, north east down", "m", ", below")
-    ] = ()  # fmt: skip
-    stay: Annotated[NonNegative, key("time within the goal before the goal moves to its next place", "s")] = 5.0
-
-
 class RegionEntry(Table, frozen=True):
     """A secondary region; the keys of its shape depend on the shape."""
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from controller import LAWS, ControllerError
 from controller.regions import Region
-from controller.regions.region_set import shape_entry
+from controller.regions.region_set import shape_center, shape_entry
 from controller.regions.shape import Shape
 from controller.restoring import parameters
 from cosim.errors import RunError, ScenarioError
@@ -22,6 +22,7 @@ from cosim.scenario.arbiter_rules import ArbiterRules, check_rules, read_rules
 from cosim.scenario.changes import changed_keys, differing_keys, join_keys, shown_title, with_values
 from cosim.scenario.criteria import PAPER, CriterionSetup, check_criteria, check_criteria_of_regions, fill_criteria
 from cosim.scenario.crossing_costs import with_crossing_costs
+from cosim.scenario.goal_mission import Mission, make_mission
 from cosim.scenario.keys import comments, hint_of_key, without_defaults
 from cosim.scenario.region_tables import PAPER_CRITERIA, SecondaryRegion, Vector3
 from cosim.scenario.roll_pitch_yaw import with_quaternions
@@ -49,6 +50,7 @@ from cosim.scenario.validation import (
     check_grids,
     check_intersection,
     check_law,
+    check_mission,
     check_regions,
     check_tables,
     expand_parameters,
@@ -105,8 +107,7 @@ class Scenario:
     goal: Shape  # primary region, kept within, at its position at time 0
     goal_velocity: Vector3  # m/s, NED
     goal_streamed: bool  # True: the goal is moved from outside during the run
-    goal_then: tuple[Vector3, ...]  # m, NED: next positions of the goal's center, in turn
-    goal_stay: float  # s, time within the goal before it moves to the next position
+    mission: Mission  # what the goal asks for in turn
     regions: tuple[SecondaryRegion, ...]
     intersection: tuple[int, ...]  # indices of the regions whose overlap the summary reports
     compare: str  # name of the claims with which the report compares the run
@@ -213,11 +214,20 @@ class Scenario:
         return Region("goal", self.goal, "in", self.goal_velocity)
 
     @property
+    def goal_then(self) -> tuple[Vector3, ...]:
+        """Center of the goal at its next places, in turn [m, NED]."""
+        return self.mission.places[1:]
+
+    @property
     def moving(self) -> tuple[str, ...]:
         """Names of the regions, goal included, that may move away from their position in the scenario."""
         goal = ("goal",) if self.goal_streamed or self.goal_then or any(self.goal_velocity) else ()
         commanded = self.commands.enabled  # commands can move all regions in space
-        regions = [s for s in self.regions if s.moves or (commanded and shape_entry(s.region.shape).has_position)]
+        regions = [
+            s
+            for i, s in enumerate(self.regions)
+            if s.moves or i in self.mission.views or (commanded and shape_entry(s.region.shape).has_position)
+        ]
         return (*goal, *(secondary.region.name for secondary in regions))
 
     @property
@@ -379,6 +389,8 @@ def make_scenario(file: File, name: str, vehicle: Vehicle | None = None) -> Scen
     vehicle = vehicle or _vehicle_of(file)
     law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions) + len(slots))
     check_tables(file, regions, vehicle)
+    mission = make_mission(goal, shape_center(goal), motion, regions)
+    check_mission(mission, law)
     regions = with_crossing_costs(regions, tuple(c.name for c in criteria), rules, file.initial.position[2])
     names = tuple(regions[i].region.name for i in overlapping)
     return Scenario(
@@ -395,8 +407,7 @@ def make_scenario(file: File, name: str, vehicle: Vehicle | None = None) -> Scen
         goal=goal,
         goal_velocity=motion.velocity,
         goal_streamed=motion.streamed or file.commands.enabled,
-        goal_then=motion.then,
-        goal_stay=motion.stay,
+        mission=mission,
         regions=regions + slots,
         intersection=overlapping,
         table=msgspec.to_builtins(msgspec.structs.replace(file, intersection=names)),

@@ -1,4 +1,4 @@
-"""The vehicle as simulated: that of its file, with the scenario's `plant.parameters`."""
+"""The vehicle as simulated: that of its file with the scenario's `plant.parameters`, and its FMU's start values."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from controller.theory import Model
 from cosim.scenario.scenario import Scenario
+from cosim.scenario.sensor_suite import scenario_sensors
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -40,6 +41,22 @@ def true_vehicle(scenario: Scenario) -> Vehicle:
     for limit in ("thrust_min", "thrust_max"):
         changed[limit] = np.asarray(changed.get(limit, getattr(vehicle, limit))) * effectiveness
     return dataclasses.replace(vehicle, **changed)  # type: ignore[arg-type]
+
+
+def start_values(scenario: Scenario) -> dict[str, float]:
+    """Return the parameters and start values that the FMU gets before initialization."""
+    initial, plant, limit = scenario.initial, scenario.plant, scenario.limit
+    values = {"substep": plant.substep, "wrench_time_constant": limit.time_constant}
+    if limit.force < np.inf:
+        values["wrench_force_limit"] = limit.force
+    for prefix, names, numbers in (
+        ("current", "xyz", plant.current),
+        ("position", "xyz", initial.position),
+        ("quaternion", ("e0", "e1", "e2", "e3"), initial.quaternion),
+        ("velocity", "uvwpqr", initial.velocity),
+    ):
+        values |= {f"{prefix}.{name}": number for name, number in zip(names, numbers, strict=True)}
+    return values | scenario_sensors(scenario) | plant.parameters
 
 
 def true_model(scenario: Scenario) -> Model:

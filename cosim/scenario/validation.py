@@ -20,7 +20,8 @@ from controller.regions import Mesh, Points, Region, Sphere
 from controller.regions.region_set import of_attitude
 from controller.regions.shape import Shape
 from cosim.errors import ScenarioError
-from cosim.scenario.region_tables import PARKED_POSITION, AnyShape, GoalMotion, RegionEntry, SecondaryRegion
+from cosim.scenario.goal_mission import GoalMotion, Mission
+from cosim.scenario.region_tables import PARKED_POSITION, AnyShape, RegionEntry, SecondaryRegion
 from cosim.scenario.tables import Commands, File, LawEntry, LawSetup, Limit
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.toml_tables import decode, hint
@@ -56,10 +57,11 @@ def check_goal(file: File) -> tuple[Shape, GoalMotion]:
     if motion.then:
         _require(not any(motion.velocity), "goal.velocity", motion.velocity, "0 0 0 beside goal.then")
         _require(not motion.streamed, "goal.streamed", "true", "false beside goal.then")
-        _require(
-            not file.commands.enabled, "commands.enabled", "true", "false beside goal.then: a mission says what is next"
-        )
-        _require(not file.record.lyapunov, "record.lyapunov", "true", "false beside goal.then: V is of one target")
+    for name in ("then", "heading", "feature", "speed"):
+        if getattr(motion, name) not in (None, ()):
+            mission, one = f"false beside goal.{name}: a mission says what is next", "V is of one target and attitude"
+            _require(not file.commands.enabled, "commands.enabled", "true", mission)
+            _require(not file.record.lyapunov, "record.lyapunov", "true", f"false beside goal.{name}: {one}")
     return shape, motion
 
 
@@ -188,6 +190,16 @@ def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_
             _require(level, "law.desired_quaternion", f"tilted in {AXES[axis]}", "no tilt there: no thruster drives it")
     law.for_vehicle(model, setup.gains, np.array(entry.desired_quaternion), period, n_regions)
     return setup
+
+
+def check_mission(mission: Mission, law: LawSetup) -> None:
+    """Raise `ScenarioError` unless the law takes the headings and speeds of a mission."""
+    if mission.turns and law.is_custom:
+        expected = "'kept' at each place: a law of one's own is given no attitude"
+        raise ScenarioError(f"goal: headings for law {law.name}, expected heading = {expected}")
+    takers = [name for name, kind in sorted(LAWS.items()) if kind.takes_speed]
+    if mission.limits_speed and law.name not in takers:
+        raise ScenarioError(f"goal: speeds for law {law.name}, expected none, or one of the laws {', '.join(takers)}")
 
 
 def check_digest(entry: LawEntry) -> str:

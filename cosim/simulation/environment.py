@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from controller.regions import Region, Sphere, pack
-from controller.regions.region_set import PackedRegions, RegionEvaluator, shape_entry
+from controller.regions.region_set import PackedRegions, RegionEvaluator, shape_center
 from controller.regions.shape import Shape
 from cosim.errors import CommandError, RunError
 from cosim.scenario.region_tables import PARKED_POSITION, Vector3
@@ -195,15 +194,3 @@ def pack_target(goal: Region) -> PackedRegions:
     """Pack a goal with space for a sphere in its place."""
     packed = pack([goal])
     return packed._replace(numbers=np.resize(packed.numbers, max(packed.numbers.size, _SPHERE_NUMBERS)))
-
-
-def shape_center(shape: Shape) -> Vector3:
-    """Return the center of a shape, the point [m, NED] by which targets are placed."""
-    center = shape_entry(shape).center
-    if center is not None:
-        return center(shape)
-    middle = [0.0, 0.0, 0.0]
-    for axis, (low, high) in enumerate(zip(*shape.bounds(), strict=True)):
-        ends = [end for end in (low, high) if math.isfinite(end)]
-        middle[axis] = sum(ends) / len(ends) if ends else 0.0
-    return middle[0], middle[1], middle[2]

@@ -11,14 +11,18 @@ from controller import Law, VehicleState
 from controller.navigation.measurements import SENSORS, VALUES, Measurements
 from controller.navigation.navigation_memory import empty_memory
 from controller.regions import pack
+from controller.regions.region_set import shape_center
+from controller.regions.shapes.visibility import Visibility
+from cosim.scenario.goal_mission import TURNING_RATE, camera_heading
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.sensor_suite import outage_schedule, scenario_sensors, sensor_model
 from cosim.simulation.actuation_limits import failure_stages
-from cosim.simulation.bindings import outputs_of
+from cosim.simulation.bindings import is_compiled, outputs_of
 from cosim.simulation.columns import columns_of_channels
-from cosim.simulation.environment import pack_target, shape_center
+from cosim.simulation.environment import pack_target
 from cosim.simulation.signals import Signals
 from cosim.step.arbiter_inputs import ArbiterSignals, empty_signals, empty_state, pack_inputs
+from cosim.step.mission_legs import MissionModel
 from cosim.step.region_positions import RegionEvaluation
 from cosim.step.step_model import N_CALLS, Array, Integers, StepData, StepModel
 from plant_fmu.running.channels import Channel
@@ -70,8 +74,7 @@ def make_model(scenario: Scenario, law: Law, clock: Integers = NO_CLOCK, for_rec
         moving=bool(scenario.moving),
         moving_regions=np.array([names.index(name) for name in scenario.moving], np.int64),
         goal_center=np.array(shape_center(scenario.goal)),
-        goal_places=(np.reshape(scenario.goal_then, (-1, 3)) - shape_center(scenario.goal)).astype(float),
-        goal_stay=math.ceil(scenario.goal_stay / step - _ROUNDING),
+        mission=make_mission_model(scenario),
         exact=sensing.exact,
         dead_from=sensing.dead_from,
         dead_until=sensing.dead_from + sensing.dead_for,
@@ -95,6 +98,36 @@ def make_model(scenario: Scenario, law: Law, clock: Integers = NO_CLOCK, for_rec
             for field, name in (("bound", "bound"), ("isolated", "failed_thruster"), ("limit", "thrust_limit"))
         },
         clock=clock,
+    )
+
+
+def make_mission_model(scenario: Scenario) -> MissionModel:
+    """Make the table of a mission's legs."""
+    mission, attitude = scenario.mission, scenario.law.desired_quaternion
+    bow, camera = camera_heading(attitude, scenario.regions)
+    centers, stops, paces, stays, radii, headings, faces, features, speeds = map(
+        np.array, zip(*mission.legs, strict=True)
+    )
+    centers[0] = 0.0  # that of the goal itself
+    if not mission.sees:
+        features = np.full_like(features, np.nan)
+    kept = np.where(np.isnan(headings), 0.0, headings - bow)
+    views = [scenario.regions[i].region.shape for i in mission.views]
+    return MissionModel(
+        centers=centers,
+        stops=stops.astype(float),
+        paces=paces,
+        stays=np.ceil(stays / scenario.time.step - _ROUNDING).astype(np.int64),
+        radii=radii,
+        headings=np.where(faces, np.nan, kept),
+        features=features,
+        speeds=speeds,
+        views=np.array(mission.views, np.int64),
+        view_features=np.reshape([shape.feature for shape in views if isinstance(shape, Visibility)], (-1, 3)),
+        turns=mission.turns,
+        attitude=np.array(attitude),
+        camera=camera,
+        turning_rate=TURNING_RATE,
     )
 
 
@@ -135,6 +168,13 @@ def step_signals(scenario: Scenario, law: Law, inputs: Sequence[str], outputs: S
     return Signals([column for column in columns if column.name not in left_out])
 
 
+def first_origins(mission: MissionModel, n: int) -> Array:
+    """Return the shifts of n regions at the start [m, NED], shape (n, 3): of those that a mission moves."""
+    origins = np.zeros((n, 3))
+    origins[mission.views] = mission.features[0] - mission.view_features
+    return origins
+
+
 def make_data(scenario: Scenario, model: StepModel, law: Law, signals: Signals, inputs: Sequence[str],
               outputs: Sequence[str], noise: Array, flags: Sequence[str] = ()) -> StepData:  # fmt: skip
     """Make state and signals of a step; noise (control steps, 6)."""
@@ -172,11 +212,15 @@ def make_data(scenario: Scenario, model: StepModel, law: Law, signals: Signals, 
         regions=regions,
         goal_center=np.array(shape_center(scenario.goal)),
         goal_origin=np.zeros((1, 3)),
-        region_origins=np.zeros((n, 3)),
+        region_origins=first_origins(model.mission, n),
         shifts=view(f"{scenario.moving[0]}.shift.x", 3 * len(scenario.moving)).reshape(-1, 3)
         if scenario.moving
         else np.zeros((0, 3)),
-        shown_goal_index=view("goal.place", 1),
+        shown_stop=view("goal.place", 1),
+        arrivals=np.full(len(scenario.mission.stops), np.nan),
+        feature=model.mission.features[0].copy(),
+        attitude=law.attitude_target if is_compiled(law) else np.zeros(4),
+        speed_limit=law.speed_limit if is_compiled(law) else np.array(np.inf),
         true_state=VehicleState(view("position.x", 3), view("quaternion.e0", 4), view("velocity.u", 6), health),
         state=state,
         arbiter_state=empty_state(),

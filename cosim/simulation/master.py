@@ -18,7 +18,7 @@ from controller.compiling.function import BoundCall, load_functions
 from controller.quaternion import from_axis_angle
 from cosim.scenario.law_factory import with_custom_law
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.start_values import start_values
+from cosim.scenario.true_vehicle import start_values
 from cosim.simulation.actuation_limits import ActuationLimits
 from cosim.simulation.bindings import BoundLaw, bind_arbiter
 from cosim.simulation.columns import columns_of

@@ -175,7 +175,8 @@ def _parameters(scenario: Scenario, loop: Loop) -> Iterator[Variable]:
         quantity = Quantity(unit if unit in UNITS else "", minimum, maximum, is_gain=True)
         description = _without_unit(key_comments.get(f"law.gains.{name}", "")) or f"Gain {name} of the law"
         yield _parameter(f"law.gains.{name}", f"gains[{i}]", quantity, description, start)
-    for i, start in enumerate(scenario.law.desired_quaternion):
+    kept = not loop.is_of_mission(loop.desired_quaternion)
+    for i, start in enumerate(scenario.law.desired_quaternion if kept else ()):
         description = f"Attitude to be kept, as unit quaternion from body to world, part {i}"
         member = loop.member(loop.desired_quaternion, i)
         yield _parameter(f"law.desired_quaternion.e{i}", member, q.QUATERNION, description, start)
@@ -210,11 +211,13 @@ def _region_parameters(regions: Sequence[Region], loop: Loop) -> Iterator[Variab
             quantity = Quantity(_GAIN_UNITS[region.shape.unit], 0.0, _MAX_GAIN)
             member = loop.member(packed.gains, k)
             yield _parameter(f"{prefix}.gain", member, quantity, f"Gain of {region.name}", region.gain)
-        for j, axis in enumerate(AXES):
+        for j, axis in enumerate("" if loop.is_of_mission(packed.velocities) else AXES):
             description = f"How fast {region.name} moves, {('north', 'east', 'down')[j]}"
             member = loop.member(packed.velocities[k], j)
             yield _parameter(f"{prefix}.velocity.{axis}", member, q.SPEED, description, region.velocity[j])
         numbers, first = zip(region.shape.numbers(), region.shape.packed(), strict=True), int(packed.offsets[k])
-        for j, ((name, unit, low, high, _), start) in enumerate(numbers, first):
+        for j, ((name, unit, low, high, _), start) in enumerate(
+            () if loop.is_of_mission(packed.numbers) else numbers, first
+        ):
             description, quantity = f"Of the shape of {region.name}, where it is at time 0", Quantity(unit, low, high)
             yield _parameter(f"{prefix}.shape.{name}", loop.member(packed.numbers, j), quantity, description, start)

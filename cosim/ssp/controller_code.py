@@ -107,7 +107,8 @@ def _scene(loop: Loop, scenario: Scenario, regions: Sequence[Region], names: Seq
 def _constraints(loop: Loop, regions: Sequence[Region], names: Sequence[str]) -> Iterator[str]:
     """Yield the constraints among the parameters, as C initializers of ``Constraint``."""
     keep, (goal, packed) = loop.memory.keep, (loop.data.goal, loop.data.regions)
-    yield f'{{HOLDS_UNIT, {keep(loop.desired_quaternion)}, 4, "law.desired_quaternion is not of length 1"}}'
+    if not loop.is_of_mission(loop.desired_quaternion):
+        yield f'{{HOLDS_UNIT, {keep(loop.desired_quaternion)}, 4, "law.desired_quaternion is not of length 1"}}'
     yield f'{{HOLDS_UNIT, {keep(loop.inputs.start) + 3}, 4, "initial.quaternion is not of length 1"}}'
     for i, (region, name) in enumerate(zip(regions, names, strict=True)):
         first = keep(packed.numbers) + int(packed.offsets[i - 1]) if i else keep(goal.numbers)

@@ -12,8 +12,8 @@ from controller.navigation.measurements import N_SENSORS
 from controller.stack_array import Shape, VectorM, VectorN
 from controller.state import State
 from cosim.step.decision import update_inputs, weigh
+from cosim.step.mission_legs import completed_steps
 from cosim.step.one_step import decide
-from cosim.step.region_positions import completed_steps
 from cosim.step.sensing import estimate_state, position_is_known, report_failures
 from cosim.step.step_model import Array, StepData, StepModel
 

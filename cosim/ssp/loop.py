@@ -37,6 +37,16 @@ class Loop:
         self.memory = Memory()
         self.constants = self._allocate_arrays()
 
+    def is_of_mission(self, array: Array) -> bool:
+        """Return True if the mission writes an array, which then is no parameter of the FMU."""
+        mission, data = self.model.mission, self.data
+        return (
+            (array is data.goal.numbers and bool(np.isfinite(mission.radii).any()))
+            or (array is data.goal.velocities and bool((mission.paces > 0.0).any()))
+            or (array is data.regions.velocities and mission.views.size > 0)
+            or (array is self.desired_quaternion and mission.turns)
+        )
+
     def member(self, array: Array, i: int = 0) -> str:
         """Return the member of the FMU's model that holds an item of an array."""
         return f"numbers[{self.memory.keep(array) + i}]"
@@ -49,7 +59,8 @@ class Loop:
             self.desired_quaternion, self.period, self.ramp,
             inputs.start, inputs.motion, inputs.samples, inputs.sample_times, data.by_criterion,
         ):  # fmt: skip
-            memory.keep(array)
+            if not self.is_of_mission(array):
+                memory.keep(array)
         n_settable = memory.size
         for array in (
             data.command, out.thrusts, out.lost, out.outages, data.signals.memberships, data.signals.inputs,
@@ -80,7 +91,7 @@ class Loop:
         model, data, out = self.model, self.data, self.out
         counters = (
             (data.storage("stage"), len(data.allocator.lower) - 1),
-            (data.storage("goal_index"), len(model.goal_places)),
+            (data.storage("leg"), len(model.mission.stops) - 1),
             (data.storage("failures"), model.failed.size),
             (out.storage("failures"), model.failed.size),
             (out.storage("changes"), model.outage_steps.size),

@@ -9,7 +9,7 @@ from pathlib import Path
 from cosim.errors import RunError
 from cosim.scenario.law_factory import require_builtin_law
 from cosim.scenario.scenario import Scenario, files_of
-from cosim.scenario.start_values import start_values
+from cosim.scenario.true_vehicle import start_values
 from cosim.ssp.arbiter import arbiter_component
 from cosim.ssp.controller import controller_component
 from cosim.ssp.structure import Part, Wire, structure

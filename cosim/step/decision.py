@@ -6,6 +6,7 @@ import numpy as np
 
 from controller.allocation import allocate, invert_curve
 from cosim.step.arbiter_inputs import compute_inputs
+from cosim.step.mission_legs import aim
 from cosim.step.plant_calls import seconds
 from cosim.step.sensing import position_is_known
 from cosim.step.step_model import ARBITER, LAW, Array, StepData, StepModel, call_back
@@ -47,6 +48,7 @@ def control(model: StepModel, data: StepData) -> None:
     started = seconds(model.clock, data.ticks) if model.clock.size > 0 else 0.0
     data.expected[:] = np.nan
     if controls(model, data):
+        aim(model, data)
         data.estimate = data.law.estimate
         call_back(data, LAW)
         data.report = data.law.report

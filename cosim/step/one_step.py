@@ -6,8 +6,9 @@ import numpy as np
 
 from cosim.step.arbiter_inputs import write_arbiter_state
 from cosim.step.decision import arbitrate, control, update_delayed_weights
+from cosim.step.mission_legs import advance_mission
 from cosim.step.plant_calls import PlantCalls, fmi_do_step, fmi_get, fmi_get_flags, fmi_set
-from cosim.step.region_positions import advance_goal, evaluate, move_regions
+from cosim.step.region_positions import evaluate, move_regions
 from cosim.step.sensing import fail_thrusters, measure, read_outputs
 from cosim.step.step_model import LOCATED, MEASURED, PLANT_STEP, Array, Integers, StepData, StepModel, call_back
 
@@ -64,7 +65,7 @@ def show_start(model: StepModel, data: StepData, plant: PlantCalls) -> None:
 
 
 def locate(model: StepModel, data: StepData) -> None:
-    """Move the regions, evaluate them at the arbiter's pose and at the true one, and advance the goal."""
+    """Move the regions, evaluate them at the arbiter's pose and at the true one, and advance the mission."""
     if model.moving:
         move_regions(model, data)
     if model.for_record or data.k % model.arbiter_every == 0:
@@ -72,7 +73,7 @@ def locate(model: StepModel, data: StepData) -> None:
         if not model.exact:
             evaluate(model, data, data.arbiter_state, data.arbiter_evaluation)
     evaluate(model, data, data.true_state, data.true_evaluation)
-    advance_goal(model, data)
+    advance_mission(model, data)
 
 
 def step_plant(model: StepModel, data: StepData, plant: PlantCalls) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -15,8 +14,6 @@ if TYPE_CHECKING:
     from cosim.step.step_model import StepData, StepModel
 
 Array = NDArray[np.float64]
-
-_ROUNDING = 1e-6  # tolerance of times, as a part of a step
 
 
 class RegionEvaluation(NamedTuple):
@@ -61,21 +58,3 @@ def move_regions(model: StepModel, data: StepData) -> None:
 def move_packed(regions: PackedRegions, origins: Array, now: float) -> None:
     """Move regions to their positions at a time [s]; origins (n, 3) [m, NED]."""
     regions.shifts[:] = regions.velocities * now + origins
-
-
-def advance_goal(model: StepModel, data: StepData) -> None:
-    """Move the goal to its next position, from the next step on, once the vehicle has stayed in it long enough."""
-    index = data.goal_index
-    data.shown_goal_index = index
-    if index == model.goal_places.shape[0]:
-        return
-    inside = data.true_evaluation.clearances[0] >= 0.0
-    data.inside_since = min(data.inside_since, data.now) if inside else math.inf
-    if completed_steps(model, data.now - data.inside_since) >= model.goal_stay:
-        data.goal_origin[0] = model.goal_places[index]
-        data.goal_index, data.inside_since = index + 1, math.inf
-
-
-def completed_steps(model: StepModel, duration: float) -> float:
-    """Return the number of steps in a duration [s], with a tolerance for its rounding."""
-    return duration / model.step + _ROUNDING

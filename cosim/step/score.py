@@ -74,7 +74,7 @@ def score_state(model: StepModel, data: StepData, metrics: FlightMetrics, k: int
                 metrics.min_angle = minimum(clearances[i], metrics.min_angle)
         if k < model.steps and not clearances[i] >= 0.0:
             metrics.weighted_violation -= model.priorities[i] * clearances[i] * model.step
-    if data.shown_goal_index == model.goal_places.shape[0]:
+    if data.shown_stop == model.mission.stops[model.mission.stops.size - 1]:
         metrics.goal_clearance = max(metrics.goal_clearance, goal_clearance)
         if goal_clearance >= 0.0 and metrics.inside == 0.0:
             metrics.last_entered = k

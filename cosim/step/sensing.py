@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from controller.navigation.navigator import navigate
+from cosim.step.mission_legs import completed_steps
 from cosim.step.plant_calls import PlantCalls, fmi_get, fmi_set_one
-from cosim.step.region_positions import completed_steps
 from cosim.step.step_model import PLANT_SET, StepData, StepModel, call_back
 
 

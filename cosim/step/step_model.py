@@ -14,9 +14,11 @@ from controller import VehicleState
 from controller.navigation.measurements import Measurements, SensorModel
 from controller.navigation.navigation_memory import NavigationMemory
 from controller.regions.region_set import PackedRegions
+from controller.stack_array import Vector3, Vector4
 from controller.state import State
 from controller.translator.foreign import POINTER, call_c
 from cosim.step.arbiter_inputs import ArbiterSignals, PackedInputs
+from cosim.step.mission_legs import MissionModel
 from cosim.step.region_positions import RegionEvaluation
 
 Array = NDArray[np.float64]
@@ -54,8 +56,7 @@ class StepModel(NamedTuple):
     moving: bool  # True if any region moves
     moving_regions: Integers  # (moving,) index of each region that moves, 0 for the goal
     goal_center: Array  # (3,) m, NED: center of the goal in the scenario, from which its displacement counts
-    goal_places: Array  # (p, 3) m, NED: shifts of the goal to its next positions, in turn
-    goal_stay: int  # steps that the vehicle has to stay in the goal before it moves to its next position
+    mission: MissionModel
     exact: bool  # True if law and arbiter receive the true state
     dead_from: float  # s, time at which position and linear velocity are lost
     dead_until: float  # s, time at which they are measured again
@@ -117,9 +118,17 @@ class StepData(State):
     goal_origin: Array  # (1, 3) m, NED: shift of the goal, extrapolated to time 0
     region_origins: Array  # (n, 3) m, NED
     shifts: Array  # (moving, 3) m, NED
-    goal_index: int  # index of the goal's present position
-    shown_goal_index: float  # the same during the step
+    leg: int  # index of the mission's present leg
+    shown_stop: float  # index of the goal's place during the step
     inside_since: float = math.inf  # s, time since which the vehicle has been in the goal; inf: it is outside
+    arrivals: Array  # (stops,) s, time at which the vehicle first was in each place of the goal; NaN: not yet
+    traveled: float  # m, along the way of the leg
+    feature: Vector3  # m, NED: what the mission looks at; NaN: nothing
+    heading: float  # rad, that the mission asks for, from the law's own attitude
+    turned: float  # rad, the heading given to the law
+    turned_at: float  # s
+    attitude: Vector4  # the law's target, with that heading
+    speed_limit: float  # m/s, the law's
     true_state: VehicleState
     state: VehicleState  # measured state, which law and arbiter receive
     arbiter_state: VehicleState  # state that the arbiter uses

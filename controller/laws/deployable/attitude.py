@@ -18,7 +18,7 @@ from controller.laws.deployable.estimate import Estimate
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.model import Dynamics, Loads, free_wrench
 from controller.linear_algebra import cross, norm
-from controller.quaternion import down_in_body, error, rate
+from controller.quaternion import down_in_body, error, multiply, rate
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, attitude_clearance
 from controller.stack_array import Array, Matrix3, Shape, Vector3, Vector4, Vector6, array, zeros
@@ -36,6 +36,7 @@ class Attitude(State):
     """State of the attitude loop."""
 
     preferred: Vector4  # from body to world: attitude where no region requires another
+    target: Vector4  # from body to world: preferred attitude of a mission, which turns steadily; NaN: none
     desired: Vector4  # from body to world: setpoint of the loop
     last_omega: Vector3  # rad/s, body rates of the last step
     by_current: Moments2  # N s, derivative of the modeled moment by the current, north and east
@@ -45,7 +46,7 @@ class Attitude(State):
 
 def empty_attitude(preferred: Array) -> Attitude:
     """Return the state before the first step, for a preferred attitude, shape (4,)."""
-    return Attitude(preferred=preferred.copy(), desired=preferred.copy())
+    return Attitude(preferred=preferred.copy(), desired=preferred.copy(), target=np.full(4, np.nan))
 
 
 def measure_moment(
@@ -81,6 +82,12 @@ def update_desired(
 ) -> None:
     """Turn the desired attitude towards the preferred one, or until regions of attitude have their comfort."""
     # Units of arguments: position [m, NED]; period [s]. No turn about axes whose `metric`, as of `Thrusters`, is 0.
+    if attitude.target[0] == attitude.target[0]:
+        back = error(attitude.preferred, attitude.desired)
+        if error(attitude.target, attitude.desired)[0] < back[0]:  # the preferred attitude would turn away: turn along
+            turned = multiply(attitude.target, back)
+            attitude.desired = turned / norm(turned)
+        attitude.preferred = attitude.target
     e, gradient = error(attitude.preferred, attitude.desired), zeros(3)  # desired = preferred * back
     omega = -2.0 * _RETURN * e[1:]
     limited = False

@@ -85,7 +85,8 @@ def step(
 ) -> None:
     """Run a step of the deployable law, as specified by `CompiledLaw.step`; `forces` are those of the thrusters [N]."""
     estimate, thrusters, dynamics, period = memory.state_estimate, memory.thrusters, memory.dynamics, memory.period
-    gains = gains._replace(speed=min(gains.speed, dynamics.max_speed))
+    speed = min(gains.speed, dynamics.max_speed)
+    gains = gains._replace(speed=min(speed, memory.speed_limit))
     input_validation.smooth_weights(weights, memory.weights, regions.hard, period / (period + gains.price_smoothing))
     # estimate
     input_validation.process_measurement(memory, state, gains)
@@ -272,6 +273,7 @@ class DeployableLaw(CompiledLaw):
     output: ClassVar[Output] = "thrusters"
     function = staticmethod(step)
     gains_type = DeployableGains
+    takes_speed = True
     diagnostics = DIAGNOSTICS
 
     def __init__(
@@ -325,3 +327,9 @@ class DeployableLaw(CompiledLaw):
         """Preferred attitude, a unit quaternion from body to world, shape (4,)."""
         preferred: Array = self.memory.attitude.preferred
         return preferred
+
+    @property
+    def attitude_target(self) -> Array:
+        """Preferred attitude that the law follows at once, shape (4,); NaN: none."""
+        target: Array = self.memory.attitude.target
+        return target

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 from controller.laws.deployable.actuator_lag import PredictedState
@@ -25,6 +26,7 @@ class DeployableMemory(State):
     """State between steps of a law for n regions and m thrusters."""
 
     period: float  # s, control period
+    speed_limit: float = math.inf  # m/s, greatest over ground to aim at
     estimate: Vector4  # phi_hat of (12) [N, N m]
     report: Report
     dynamics: Dynamics

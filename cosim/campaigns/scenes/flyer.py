@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cosim.batch.fused import fly_scenario
+from cosim.batch.outcome import Arrivals, arrivals_of
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import fmu_table, gains_from, law_class
@@ -42,6 +43,7 @@ class Score(NamedTuple):
     weighted_violation: float = 0.0  # m s, sum over regions of priority times the integral of the violation depth
     bound_promised: float = math.nan  # fraction of its steps in which the law gave a bound; NaN: it has none
     healthy_weakened: bool = False  # a healthy thruster was isolated, or its limit lowered below half its true one
+    arrivals: Arrivals = ()  # s, first time within the goal at each of its places; None: never
 
 
 def _least_limit(scenario: Scenario) -> float:
@@ -122,8 +124,8 @@ class SceneFlyer:
         """
         scenario = scene_scenario(scene, self.law, self.gains, self.conditions)
         plant = self._plant(scenario.vehicle)
-        metrics, _, _, signals = fly_scenario(plant, scenario, trace, self._clock.numbers, self._fmu_law(scenario))
-        return self._score(metrics, scenario), signals
+        metrics, _, data, signals = fly_scenario(plant, scenario, trace, self._clock.numbers, self._fmu_law(scenario))
+        return self._score(metrics, scenario)._replace(arrivals=arrivals_of(data.arrivals)), signals
 
     def _fmu_law(self, scenario: Scenario) -> FmuLaw | None:
         name = scenario.vehicle.name

@@ -8,8 +8,9 @@ from typing import Any
 
 import pyarrow as pa
 
+from cosim.batch.outcome import arrivals_text
 from cosim.campaigns.scenes.flyer import Score
-from cosim.campaigns.store.results import make_schema, make_table
+from cosim.campaigns.store.results import ARRIVALS, make_schema, make_table
 
 Row = dict[str, Any]  # values by column; a missing one is null
 _INTEGER, _FLOAT, _BOOL, _TEXT = pa.int64(), pa.float64(), pa.bool_(), pa.string()
@@ -29,6 +30,7 @@ _COLUMNS = (  # name, type, unit, description
     ("stopped_at", _FLOAT, "s", "When the FMU refused to go on, 0 for not at all; null if it never did"),
     ("refused", _TEXT, "", "Why the scene was not flown; null if it was"),
     ("scene", _TEXT, "", "The scene itself, as a line of JSON"),
+    ARRIVALS[:4],
 )
 SCHEMA: Any = make_schema((*column, column[1] in (_FLOAT, _TEXT)) for column in _COLUMNS)
 
@@ -45,6 +47,7 @@ def row_of(seed: int, score: Score, plant_step: float, scene: str = "") -> Row:
         "worst_step_time": row.pop("worst_step"),
         "stopped_at": failed_step * plant_step if stopped else None,
         "scene": scene,
+        "arrivals": arrivals_text(score.arrivals),
     }
     return {key: None if isinstance(x, float) and not math.isfinite(x) else x for key, x in row.items()}
 

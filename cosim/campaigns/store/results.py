@@ -18,6 +18,9 @@ from cosim.simulation.signals import Array
 
 _MAX_NUMBER = 1e100  # maximum size of a number, whose powers are still finite
 _CHUNK = 1000  # number of rows that are read at once
+# name, type, unit, description and nulls of a column that older results lack
+_MISSION = "First times within the goal at each of its places, as JSON; null: of a goal with one place"
+ARRIVALS = ("arrivals", pa.string(), "s", _MISSION, True)
 
 
 class Results:
@@ -28,6 +31,8 @@ class Results:
         with self._readable():
             metadata = pq.read_metadata(path)
             self.schema = metadata.schema.to_arrow_schema()
+        if schema is not None and ARRIVALS[0] not in self.schema.names:
+            schema = pa.schema([field for field in schema if field.name != ARRIVALS[0]])
         if schema is not None and not self.schema.equals(schema):
             raise RunError(f"{path}: cannot be read: {_difference(self.schema, schema)}")
         self._rows = int(metadata.num_rows)

@@ -13,10 +13,10 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from cosim.batch.fused import FusedFlyer
-from cosim.batch.outcome import FIELDS, BatchResult, empty_outcomes
+from cosim.batch.outcome import FIELDS, BatchResult, arrivals_text, empty_outcomes
 from cosim.batch.variation import Variation
 from cosim.campaigns.store.plan import SWEEP, code_digest, versions
-from cosim.campaigns.store.results import make_schema, make_table
+from cosim.campaigns.store.results import ARRIVALS, make_schema, make_table
 from cosim.campaigns.sweeps.design import Design
 from cosim.campaigns.workers.work import Rows, Work
 from cosim.errors import RunError
@@ -35,7 +35,7 @@ class SweepBatch(NamedTuple):
 
 def schema_of(keys: tuple[str, ...]) -> Any:
     """Make the schema of the rows of a sweep."""
-    if reserved := {"row", "seed", "refused", *FIELDS} & set(keys):
+    if reserved := {"row", "seed", "refused", ARRIVALS[0], *FIELDS} & set(keys):
         raise ValueError(f"{min(reserved)!r} varies, expected keys of a scenario")
     return make_schema(
         [
@@ -44,6 +44,7 @@ def schema_of(keys: tuple[str, ...]) -> Any:
             ("seed", pa.int64(), "", "Of what is random in the row", False),
             *((name, _TYPES[kind], unit, text, True) for name, (kind, unit, text) in FIELDS.items()),
             ("refused", pa.string(), "", "Why the row was not flown; null if it was", True),
+            ARRIVALS,
         ]
     )
 
@@ -51,12 +52,13 @@ def schema_of(keys: tuple[str, ...]) -> Any:
 def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: BatchResult) -> Any:
     """Convert flights to a table."""
     reasons = [flown.refused.get(i) for i in range(len(batch.rows))]
+    arrivals = [arrivals_text(flown.arrivals.get(i, ())) for i in range(len(batch.rows))]
     outcomes: list[NDArray[Any]] = [
         flown.outcomes[name].astype(object if kind is np.bool_ else kind) for name, (kind, _, _) in FIELDS.items()
     ]
     for column in outcomes:
         column[list(flown.refused)] = None  # NaN among floats
-    return make_table(schema_of(keys), [batch.rows, *batch.values.T, batch.seeds, *outcomes, reasons])
+    return make_table(schema_of(keys), [batch.rows, *batch.values.T, batch.seeds, *outcomes, reasons, arrivals])
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from controller.regions.region_set import shape_center
 from cosim.scenario.region_tables import Vector3
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.start_values import start_values
+from cosim.scenario.true_vehicle import start_values
 from cosim.simulation.commands.commands import MODES
-from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array, Column
 from plant_fmu.variables import variables
 

@@ -85,7 +85,8 @@ class Run {
    */
   shift(region, t, place = null) {
     const { name, is_dynamic: isDynamic, places } = this.header.regions[region];
-    if (places) return places[place ?? this.goalPlace(t)];
+    if (places && place !== null && place !== this.goalPlace(t)) return places[place];
+    if (places) return this.vectorHeld(`${name}.shift`, t); // it leaps between places
     if (!this.has(`${name}.shift.x`)) return [0, 0, 0];
     // do not interpolate between the parked position and the scene
     const next = Math.min(this.row(t) + 1, this.rows - 1);

@@ -33,11 +33,9 @@ class Flight {
       const { target, offsets } = this.slots.get(key);
       if (target === "noise") job.noise[offsets[0]] = x;
       else if (target === "middle") job.numbers.push(...offsets.map((at) => [at, (x + value(otherEnd(key))) / 2]));
+      else if (target === "moved") job.numbers.push(...movedNumbers(this.slots.get(key), x));
       else job[target]?.push(...offsets.map((at) => [at, x]));
     }
-    goalPlaces(data, value).slice(1).forEach((place, i) => place.forEach((x, axis) => {
-      job.numbers.push([this.slots.get(`goal.then.${i}.${axis}`).offsets[0], x]);
-    }));
     if (failure && data.failures) this._fail(job, failure);
     return this._ask(job);
   }
@@ -74,13 +72,19 @@ class Flight {
 /** Return the key of a cylinder's other end. */
 const otherEnd = (key) => key.replace(/\.(start|end)\./, (_, end) => (end === "start" ? ".end." : ".start."));
 
+/** Return the numbers that move with a key, as [index, number], once it has the value `x`. */
+const movedNumbers = ({ value, offsets, numbers }, x) =>
+  offsets.map((at, i) => [at, numbers[i] === value ? x : numbers[i] + (x - value)]);
+
 /** Return the shifts of the goal to its places in turn [m, NED], from the numbers of `value(key)`. */
-function goalPlaces({ goals, goal_center: recorded }, value) {
+function goalPlaces({ places, goal_center: recorded, slots }, value) {
   const center = recorded.map((x, axis) => {
     const [middle, start, end] = ["center", "start", "end"].map((name) => value(`goal.${name}.${axis}`));
     return middle ?? (start === undefined ? x : (start + end) / 2);
   });
-  const later = Array.from({ length: goals }, (_, i) => center.map((x, axis) => value(`goal.then.${i}.${axis}`) - x));
+  const first = new Map(slots.map(({ key, value: x }) => [key, x]));
+  const by = (key) => value(key) - first.get(key);
+  const later = places.map(([place, key]) => place.map((x, axis) => x + by(`${key}.${axis}`) - center[axis]));
   return [[0, 0, 0], ...later];
 }
 

@@ -37,6 +37,16 @@ function verdictOf({ metrics, message }, run, { reach_time: reach, settle_time: 
   return `${words}; it ${regionText}.${metrics.failed_step >= 0 ? stopped : ""}`;
 }
 
+/** Return an event for the first row within the goal at each of its places. */
+function arrivalsOf(run) {
+  const [goal] = run.header.regions;
+  const [place, clearance] = ["goal.place", "goal.clearance"].map((name) => run.column(name));
+  return (goal.stops ?? []).flatMap((name, stop) => {
+    const row = run.time.findIndex((_, i) => place[i] === stop && clearance[i] >= 0);
+    return row < 0 ? [] : [{ time: run.time[row], kind: "goal", text: `Reaches ${name} of the goal` }];
+  });
+}
+
 function eventsOf(run, { reach_time: reach }, failure) {
   const { regions } = run.header;
   const violations = regions.slice(1).flatMap(({ name, unit }) => {
@@ -51,6 +61,7 @@ function eventsOf(run, { reach_time: reach }, failure) {
   });
   const events = [
     ...(failure ? [{ time: failure.time, kind: "failure", text: `Thruster ${failure.thruster} fails` }] : []),
+    ...arrivalsOf(run),
     ...(reach !== null ? [{ time: reach, kind: "goal", text: "Enters the goal region" }] : []),
     ...violations,
     ...changes,

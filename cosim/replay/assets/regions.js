@@ -53,7 +53,8 @@ function placesOfRegion(run, index, t) {
   const { places } = run.header.regions[index];
   if (!places) return [{ place: null, next: false, shift: run.rows ? run.shift(index, t) : [0, 0, 0] }];
   const now = run.goalPlace(t);
-  return places.map((shift, place) => ({ place, next: place > now, shift })).slice(now, now + 2);
+  const at = (place) => run.shift(index, t, place); // the present one may be on its way
+  return [...places.keys()].slice(now, now + 2).map((place) => ({ place, next: place > now, shift: at(place) }));
 }
 
 /** Set color and style of an entry: an active region in full, the goal seen through others, the next one dotted. */

@@ -24,13 +24,19 @@ class WhatIf {
 
   /** Return what can be moved, each place of the goal by itself: {region, place, name, axes: keys of each axis}. */
   movable() {
-    const { moves, goals } = this.flight.data;
+    const { moves, places } = this.flight.data;
     const all = this.recorded.header.regions.flatMap((of, region) =>
-      Array.from({ length: region || !goals ? 1 : goals + 1 }, (_, place) => {
-        const later = [0, 1, 2].map((axis) => [`goal.then.${place - 1}.${axis}`]);
-        return { region, place, name: regionName(of, place), axes: place ? later : moves[region] };
+      Array.from({ length: region || !places.length ? 1 : places.length + 1 }, (_, place) => {
+        const later = place ? [0, 1, 2].map((axis) => [`${places[place - 1][1]}.${axis}`]) : null;
+        return { region, place, name: regionName(of, place), axes: later ?? moves[region] };
       }));
     return all.filter(({ axes }) => axes);
+  }
+
+  /** Return what can be moved, of places that move together, as rings do, the first. */
+  groups() {
+    const keyOf = ({ axes }) => axes.flat()[0];
+    return this.movable().filter((one, i, all) => all.findIndex((other) => keyOf(other) === keyOf(one)) === i);
   }
 
   /** Move a region, or the goal's later `place`, from one point to another [m, NED]. */
@@ -172,7 +178,7 @@ class WhatIf {
 
   /** Return the changes as texts. */
   words() {
-    const movable = this.movable();
+    const movable = this.groups();
     const draggedRegions = movable.filter(({ axes }) => axes.flat().some((key) => this.values.has(key)));
     const placed = new Set(movable.flatMap(({ axes }) => axes.flat()));
     const numbers = [...this.values].filter(([key]) => !placed.has(key)).map(([key, value]) => {

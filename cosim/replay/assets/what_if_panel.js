@@ -114,7 +114,7 @@ class WhatIfPanel extends FieldPanel {
   _places() {
     const { whatIf } = this;
     const { regions } = whatIf.recorded.header;
-    const sets = whatIf.movable().map(({ region, place, name, axes }) => {
+    const sets = whatIf.groups().map(({ region, place, name, axes }) => {
       const values = () => axes.map(([key]) => whatIf.value(key));
       const handle = () => placeOf(whatIf.run, region, whatIf.run.start, place) ?? values();
       const fields = [...axes.keys()].filter((axis) => axes[axis].length).map((axis) => {

@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from controller.regions.region_set import shape_entry
 from controller.regions.shape import Shape
+from controller.regions.shapes.visibility import Visibility
 from cosim.replay.interactive.flight import Flight
 from cosim.scenario.changes import value_at
 from cosim.scenario.key_names import PARAMETERS, key_name
@@ -33,17 +35,16 @@ class Slot:
     unit: str  # unit of `value`
     value: float  # value in the scenario
     # where the number goes: ``numbers`` or ``gains`` of the module, ``starts`` of the plant, or ``noise``; ``middle``
-    # of a cylinder's two ends, ``shift`` from the goal's center, which are ``numbers`` that the page computes
+    # of a cylinder's two ends, or ``moved`` with all that belongs to it, which are ``numbers`` that the page computes
     target: str
     offsets: tuple[int, ...]  # indices there, or value references of the plant
+    numbers: tuple[float, ...] = ()  # of ``moved``: numbers there in the scenario
 
 
 def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | None]]:
     """Return the numbers that a page may change, and for each region the keys that move it; None if none do."""
     scenario, data, model = flight.scenario, flight.data, flight.model
-    targets: dict[str, tuple[str, tuple[int, ...]]] = {
-        key: ("starts", (flight.reference(name),)) for key, name in _STARTS.items()
-    }
+    targets: dict[str, tuple[Any, ...]] = {key: ("starts", (flight.reference(name),)) for key, name in _STARTS.items()}
     if flight.noise.size:
         targets |= {key: ("noise", (i,)) for i, key in enumerate(_NOISE)}
     gains = scenario.law.gains
@@ -55,6 +56,8 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | 
     shapes += [(f"regions.{i}.shape", r.region.shape, data.regions, i) for i, r in enumerate(scenario.regions)]
     for path, shape, packed, i in shapes:
         positions, first = list(_positions(path, shape)), memory.keep(packed.numbers) + int(packed.offsets[i])
+        if scenario.mission.sees and isinstance(shape, Visibility):  # the mission looks at its feature, or moves it
+            positions = []
         # of a goal without a point for its center, the page does not know the shifts to its next positions
         if not positions or (path == "goal" and scenario.goal_then and not has_center):
             moves.append(None)
@@ -64,13 +67,30 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | 
             centers = (model.goal_center, data.goal_center) if path == "goal" and has_center else ()
             offsets = first + index, *(memory.keep(center) + axis for center in centers)
             targets |= dict.fromkeys(keys, ("numbers" if len(keys) == 1 else "middle", offsets))
-    for i in range(model.goal_places.size):
-        targets[f"goal.then.{i // 3}.{i % 3}"] = "shift", (memory.keep(model.goal_places) + i,)
+    if has_center:
+        targets |= _places(flight, memory)
     slots = []
     for key, target in targets.items():
         name, value = key_name(key, scenario.table, scenario.vehicle), value_at(scenario.table, key, scenario.vehicle)
         slots.append(Slot(key, name.words, name.unit, float(value), *target))
     return slots, moves
+
+
+def _places(flight: Flight, memory: Memory) -> dict[str, tuple[str, tuple[int, ...], tuple[float, ...]]]:
+    """Return where the keys go that move the goal's next places, each with all centers and features that move along."""
+    scenario, model, targets = flight.scenario, flight.model.mission, {}
+    for key in dict.fromkeys(scenario.mission.keys[1:]):
+        north = f"{key}.0"
+        moved = scenario.replace({north: float(value_at(scenario.table, north, scenario.vehicle)) + 1.0}).mission
+        for axis in range(3):
+            offsets, numbers = [], []
+            for array, field in ((model.centers, "center"), (model.features, "feature")):
+                for i, (leg, other) in enumerate(zip(scenario.mission.legs, moved.legs, strict=True)):
+                    if getattr(other, field)[0] - getattr(leg, field)[0] > 0.5:
+                        offsets.append(memory.keep(array) + 3 * i + axis)
+                        numbers.append(float(array[i, axis]))
+            targets[f"{key}.{axis}"] = "moved", tuple(offsets), tuple(numbers)
+    return targets
 
 
 def _positions(path: str, shape: Shape) -> Iterator[tuple[int, int, tuple[str, ...]]]:

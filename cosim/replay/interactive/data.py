@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
+from controller.regions.region_set import shape_center
 from cosim.errors import RunError
 from cosim.io.strict_json import nan_to_none
 from cosim.replay.interactive.adjustable import BUOYANCY, find_slots
@@ -21,7 +22,6 @@ from cosim.results.run_result import Run
 from cosim.results.spans import SETTLED_FOR
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.actuation_limits import failure_stages
-from cosim.simulation.environment import shape_center
 from cosim.ssp.memory import Memory
 
 
@@ -49,7 +49,8 @@ def flight_data(run: Run) -> dict[str, Any]:
         "slots": [dataclasses.asdict(slot) for slot in slots],
         "moves": moves,
         "noise": [scenario.sensing.position_noise, scenario.sensing.velocity_noise],
-        "goals": len(scenario.goal_then),  # positions of the goal after the first
+        # centers of the goal's next places in the scenario [m, NED], and the key that moves each
+        "places": [[list(leg.center), key] for leg, key in scenario.mission.next_stops],
         "goal_center": list(shape_center(scenario.goal)),
         "restoring": _restoring(scenario),
         "failures": _failures(flight, memory),

@@ -13,7 +13,7 @@ from cosim.batch.fused import require_fused
 from cosim.replay.view_columns import added_columns, is_drawn
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.start_values import start_values
+from cosim.scenario.true_vehicle import start_values
 from cosim.simulation.columns import columns_of_channels
 from cosim.simulation.make_step import SENSED, exchanged_variables, make_data, make_model
 from cosim.simulation.signals import Column, Signals

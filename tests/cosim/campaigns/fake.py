@@ -98,5 +98,5 @@ def expected(n=50):
     for i in range(n):
         row = {"row": i} | dict(zip(KEYS, values[i].tolist(), strict=True)) | {"seed": int(seeds[i])}
         row |= {name: outcomes[name][i].item() for name in FIELDS}
-        table.append({k: None if v != v else v for k, v in row.items()} | {"refused": None})
+        table.append({k: None if v != v else v for k, v in row.items()} | {"refused": None, "arrivals": None})
     return table

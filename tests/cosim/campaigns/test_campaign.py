@@ -55,6 +55,7 @@ def test_one_row_per_scene_ordered_by_seed(tmp_path, scenes, caplog):
         "seed": "", "reached": "", "violation": "", "min_clearance": "m", "bound_excess": "m",
         "bound_promised": "", "healthy_weakened": "", "weighted_violation": "m.s", "reach_time": "s",
         "effort": "N.s", "thrust_variation": "N", "worst_step_time": "s", "stopped_at": "s", "refused": "", "scene": "",
+        "arrivals": "s",
     }  # fmt: skip
     assert all(f.metadata[b"description"] for f in table.schema)
 

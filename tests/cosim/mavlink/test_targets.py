@@ -7,6 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from controller.quaternion import from_axis_angle
+from controller.regions.region_set import shape_center
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.speed import terminal_speed
 from cosim.simulation.commands.commands import (
@@ -19,7 +20,6 @@ from cosim.simulation.commands.commands import (
     SetMode,
     SetTarget,
 )
-from cosim.simulation.environment import shape_center
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import ACCEPTED, DENIED, NAN, UNSUPPORTED, Station, close_to, long, scenario
 from tests.cosim.mavlink.stubs import message

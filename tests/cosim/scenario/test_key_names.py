@@ -76,11 +76,12 @@ def keys_of(value, path=""):
 
 
 def test_units_are_those_of_the_document():
-    scenario = load_scenario("docking", ["commands.enabled=true"])
+    docking, mission = load_scenario("docking", ["commands.enabled=true"]), load_scenario("pile-inspection")
     asked = 0
     for keys, unit in re.findall(r"^\| (`[^|]*) \| ([^|]*) \|", DOCUMENT.read_text(), re.M):
         for key in re.findall(r"`([a-z_.\[\]]+)`", keys):
-            key = key.replace("[]", ".heading")
+            scenario = mission if key.startswith("goal.then[]") else docking
+            key = key.replace("then[]", "then.0").replace("[]", ".heading")
             if "." in key and unit.strip() and not key.endswith("streamed"):
                 assert key_name(key, scenario.table, scenario.vehicle).unit == unit.strip(), key
                 asked += 1

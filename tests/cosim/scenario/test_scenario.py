@@ -37,7 +37,8 @@ def saved(tmp_path, text, name="mine.toml"):
 def test_shipped_scenarios_load():
     assert list_scenarios() == [
         "dense-field", "depth-transit", "docking", "harbour", "inspection-visibility", "moving-obstacle", "paper",
-        "paper-calibrated", "paper-deployable", "paper-limited", "pipe-inspection", "sitl",
+        "paper-calibrated", "paper-deployable", "paper-limited", "pile-inspection", "pipe-inspection",
+        "sitl",
     ]  # fmt: skip
     for name in list_scenarios():
         assert load_scenario(name).title

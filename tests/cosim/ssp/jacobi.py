@@ -5,7 +5,7 @@ import numpy as np
 from controller import VehicleState
 from controller.regions import pack
 from cosim.scenario.law_factory import law_of
-from cosim.scenario.start_values import start_values
+from cosim.scenario.true_vehicle import start_values
 from cosim.ssp.system import MOTION, WRENCH
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.criteria import ramp

@@ -158,7 +158,7 @@ def test_tour_has_successive_goals_on_both_sides_of_the_conflict():
     for seed in range(20):
         scenario = scenario_of(make_conflict(seed, "tour"))
         first, then = np.array(scenario.goal.center), np.array(scenario.goal_then)
-        assert then.shape == (2, 3) and scenario.goal_stay == 3.0
+        assert then.shape == (2, 3) and scenario.mission.legs[0].stay == 3.0
         kind = scenario.title.removeprefix(f"Tour {seed}: ").split()[0]
         axis, middle = {"sides": (0, 5.0), "views": (0, 4.0), "depths": (2, 0.5 * (first[2] + then[0, 2]))}[kind]
         assert np.sign(first[axis] - middle) == np.sign(then[1, axis] - middle) == -np.sign(then[0, axis] - middle)

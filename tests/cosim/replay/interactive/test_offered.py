@@ -89,7 +89,8 @@ def regions_of_every_shape():
 
 FLIGHTS = {
     **{law: lambda law=law: flight_of("docking", [f"law.name={law}"]) for law in LAWS},
-    **{name: lambda name=name: flight_of(name) for name in ("harbour", "depth-transit", "pipe-inspection")},
+    **{name: lambda name=name: flight_of(name)
+       for name in ("harbour", "depth-transit", "pipe-inspection", "pile-inspection")},
     "wrench": lambda: flight_of("paper", ["arbiter.engine=closed"]),
     "every shape": lambda: flight_of("docking", regions=regions_of_every_shape(), intersection=[]),
     **{f"goals, {name}": lambda shape=shape: flight_of("docking", goal=shape | {"then": THEN})
