@@ -69,7 +69,8 @@ class Loop:
             memory.keep(array)
         n_outputs = memory.size - n_settable
         memory.keep(model.inputs.memberships.ramps)
-        for array in (data.goal.shifts, data.regions.shifts, *arrays_of(self.law.memory)):
+        of_mission = data.goal.numbers, data.goal.velocities, data.regions.velocities
+        for array in (data.goal.shifts, data.regions.shifts, *of_mission, *arrays_of(self.law.memory)):
             memory.keep(array)
         memory.fix(model, data.goal, data.regions, data.allocator, *map(data.storage, ("k", "manual", "failed_step")))
         if not model.through_sensors:

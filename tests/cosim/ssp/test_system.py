@@ -140,6 +140,7 @@ def test_masters_reproduce_shipped_scenarios(name, settings, master, fmi, tmp_pa
         # its yaw swings up, and with it what is rounded: by 9 % a step, above 1e-10 after 1.2 s
         ("docking", ["law.name='pid_cbf'", "time.duration=1.0"]),
         ("docking", ["sensing.dead_from=0.5", "sensing.dead_for=0.3"]),
+        ("pile-inspection", ["initial.position=[5.7, 0.0, 3.0]", "goal.stay=0.2", "goal.then.0.tolerance=0.3"]),
         ("docking", ["goal.then=[[6.5, -3.0, 3.0]]", "goal.stay=0.2", "goal.center=[6.8, -3.0, 3.0]"]),
     ],
 )
