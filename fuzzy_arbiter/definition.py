@@ -17,7 +17,7 @@ from fuzzy_arbiter.table import html_of, rule_rows
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.terms.term import AutomaticTerms, Term
-from fuzzy_arbiter.terms.values import Formula, Linear, Value, invertible
+from fuzzy_arbiter.terms.values import Formula, Linear, Value
 
 _Terms = dict[str, frozenset[str]]  # names of each variable's terms
 Defuzzifier = Literal["centroid", "bisector", "mom", "som", "lom", "average", "sum"]
@@ -170,7 +170,7 @@ class Output(Variable):
         if not self.weighted:
             object.__setattr__(self, "terms", tuple(map(self._joinable, self.terms)))
         for term in self.terms if self.weighted else ():
-            if not isinstance(term.shape, Value) and not invertible(term.shape):
+            if not isinstance(term.shape, Value) and not term.shape.invertible:
                 raise DefinitionError(
                     f"{what}: term {term.name!r} is no value, nor does it only rise or only fall, as the defuzzifier "
                     f"{self.defuzzifier!r} expects it"

@@ -20,7 +20,6 @@ from fuzzy_arbiter.samples import Sample
 from fuzzy_arbiter.shapes import Array, Shape
 from fuzzy_arbiter.verification.cells import stretches
 from fuzzy_arbiter.verification.questions import Questions, greatest_term
-from fuzzy_arbiter.verification.search import Goal
 
 Setting = float | Mapping[str, float]
 EFFORT = 100_000_000  # maximum number of statements of the search for the row at rest, less than a second
@@ -222,8 +221,7 @@ def _on_terms(system: System, on: Mapping[str, str] | None) -> list[str]:
         return [on[v.name] for v in system.inputs]
     # at rest no output is in its greatest term; if there is one such row, the criteria are on in the other terms
     ask = Questions.of_rows(system, EFFORT)
-    high = tuple(ask.above_half(Is(v.name, greatest_term(v))) for v in system.outputs)
-    (answer,) = ask.ask([Goal(high, 0, 0)], 2)
+    (answer,) = ask.ask([ask.none_of([Is(v.name, greatest_term(v)) for v in system.outputs], 0.5)], 2)
     if len(answer.boxes) != 1 or not answer.is_complete or len(answer.boxes[0]) < len(system.inputs):
         raise DefinitionError(
             "on: the rules do not determine which terms ask for attention, as there is not one single row in which no "

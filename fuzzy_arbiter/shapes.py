@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 from operator import itemgetter
 from typing import Any, ClassVar
 
@@ -48,6 +47,15 @@ class Membership(ABC):
     def features(self, universe: tuple[float, float]) -> tuple[float, ...]:
         """Return the positions within a universe around which it changes, in rising order; by default its breaks."""
         return self.breaks(universe)
+
+    @property
+    def invertible(self) -> bool:
+        """True if it only rises or only falls, so that each degree has a position, for Tsukamoto's method."""
+        return False
+
+    def place_of(self, degree: float) -> float:
+        """Return the position, perhaps infinite, at which an invertible function has a degree."""
+        raise NotImplementedError
 
     def within(self, universe: tuple[float, float]) -> Membership:
         """Return the same function without parts that do not matter in a universe; by default the function itself."""
@@ -176,6 +184,16 @@ class Shape(Membership):
         """True if there is a jump."""
         return any(a == b for (a, _), (b, _) in zip(self.points, self.points[1:], strict=False))
 
+    @property
+    def invertible(self) -> bool:
+        """True if it is a ramp from or to 0."""
+        return len(self.points) == 2 and not self.jumps and min(y for _, y in self.points) == 0.0
+
+    def place_of(self, degree: float) -> float:
+        """Return the position at which a ramp has a degree."""
+        (a, left), (b, right) = self.points
+        return a + (b - a) * ((degree - left) / (right - left))
+
     def complement(self) -> Shape:
         """Return the shape with one minus this one's degree everywhere; raise `DefinitionError` if this one jumps."""
         if self.jumps:
@@ -200,19 +218,6 @@ class Shape(Membership):
             del points[-1]
         inside = Shape(tuple(points))
         return inside if len(inside.points) > 1 else Shape(((low, inside.points[0][1]),))
-
-    def area(self, universe: tuple[float, float]) -> float:
-        """Return the integral of the degree over a universe, to rounding."""
-        low, high = map(Fraction, universe)
-        points = [(Fraction(x), Fraction(degree)) for x, degree in self.points]
-        points = [(min(low, points[0][0]), points[0][1]), *points, (max(high, points[-1][0]), points[-1][1])]
-        area = Fraction(0)
-        for (a, left), (b, right) in zip(points, points[1:], strict=False):
-            start, end = max(a, low), min(b, high)
-            if start < end:
-                slope = (right - left) / (b - a)
-                area += (end - start) * (left + slope * ((start + end) / 2 - a))
-        return float(area)
 
 
 def triangle(left: float, peak: float, right: float) -> Shape:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 from fuzzy_arbiter.definition import System
-from fuzzy_arbiter.engines.clipped_centroid_batch import Centroid
+from fuzzy_arbiter.engines.clipped_centroid import Centroid
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.engine import Engine
 from fuzzy_arbiter.engines.exact import ExactEngine

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
+from bisect import bisect_right
 from collections.abc import Sequence
 
 import numpy as np
@@ -31,7 +33,8 @@ _NODES, _WEIGHTS = legendre.leggauss(_ORDER)
 _SERIES = ((np.arange(_ORDER) + 0.5) * legendre.legvander(_NODES, _ORDER - 1)) * _WEIGHTS[:, None]
 _AS_POWERS = np.array([np.pad(legendre.leg2poly(row), (0, _ORDER - k - 1)) for k, row in enumerate(np.eye(_ORDER))])
 _TABLE = -np.cos(np.linspace(0.0, np.pi, 65))  # positions in a panel of the table by which a degree's is guessed
-_SPACING = np.pi / 64
+_GUESSES = _TABLE.tolist()
+_SPACING = math.pi / 64
 _INNER_TABLE = _TABLE * (1.0 - 1e-9)  # on the panel's side of a jump
 _POWERS = np.arange(_ORDER)
 _STEPS, _FINE_STEPS = 2, 5  # of Newton's method: where the area counts, and where the position does
@@ -75,6 +78,7 @@ class ClippedCurves(Defuzzifier):
         if not self._error < _ERROR * max(shape.area(output.universe) for shape in shapes):
             raise EngineError(f"output {output.name!r}: its terms are too rough, expected smooth terms")
         self._lines = np.concatenate([lines, lines], axis=1) if self._max else lines  # clipped at tops, and at bottoms
+        self._plain_slots: list[list[int]] = self._slots.tolist()
         self._keys, self._positions = keys, np.tile(_TABLE, self._slots.size)
         ones = np.ones(self._lines.shape[1])
         self._full = np.array(_integrals(self._lines, ones, ones))
@@ -85,6 +89,40 @@ class ClippedCurves(Defuzzifier):
         size = max(1, _BLOCK // self._lines.shape[1])
         compute = self._of_area if self._kind in ("centroid", "bisector") else self._of_maximum
         return np.concatenate([compute(cuts[:, i : i + size]) for i in range(0, max(1, cuts.shape[1]), size)])
+
+    def value(self, cuts: Sequence[float], inputs: Sequence[float]) -> float:
+        """Return the value for one sample; the centroid of clipped terms by the operations of `values`, on floats."""
+        if self._scales or not self._max or self._kind != "centroid":
+            return super().value(cuts, inputs)
+        tops, bottoms = [], []
+        for slots in self._plain_slots:
+            below = 0.0
+            for slot in slots:
+                counts, top = cuts[slot] > below, max(cuts[slot], below)
+                tops.append((top, counts))
+                bottoms.append((below, counts))
+                below = top
+        area = moment = 0.0
+        for sign, levels in ((1.0, tops), (-1.0, bottoms)):
+            for line, (level, counts) in zip(self._plain_lines, levels, strict=True):
+                if level >= line.high:
+                    part, lever = line.full
+                elif counts and level > line.low:
+                    part, lever = line.cut(level)
+                else:
+                    part = 2.0 * line.half * level
+                    lever = line.middle * part
+                area += sign * part
+                moment += sign * lever
+        if not area * _ERROR >= self._error:
+            return super().value(cuts, inputs)
+        return min(max(self._universe[0] + moment / area, self._universe[0]), self._universe[1])
+
+    @functools.cached_property
+    def _plain_lines(self) -> list[_PlainLine]:
+        keys = self._keys.reshape(-1, len(_TABLE)).tolist()
+        columns = self._lines.T[: len(keys)].tolist(), self._full.T[: len(keys)].tolist()
+        return [_PlainLine(2 * i, own, *each) for i, (own, *each) in enumerate(zip(keys, *columns, strict=True))]
 
     @functools.cached_property
     def _quadrature(self) -> Quadrature:
@@ -209,6 +247,43 @@ class ClippedCurves(Defuzzifier):
             r = r - off / np.where((slope > 0.0) & (np.abs(off) > _NOISE), slope, np.inf)
             r = np.minimum(np.maximum(r, first), last)
         return np.asarray(r)
+
+
+class _PlainLine:
+    """A line in floats, for one sample."""
+
+    def __init__(self, first_key: int, keys: list[float], column: list[float], full: list[float]) -> None:
+        self.middle, self.half, self.sign, self.low, self.high = column[:_DEGREE]
+        self.degree, self.integral = column[_DEGREE:_INTEGRAL], column[_INTEGRAL:_LEVER]
+        self.slopes = [k * factor for k, factor in enumerate(self.degree)][1:]
+        self.lever, self.full = column[_LEVER:], (full[0], full[1])
+        self.keys, self.first_key = keys, first_key
+
+    def cut(self, level: float) -> tuple[float, float]:
+        """Return the area and the moment below a level that the line passes, as `_meeting` and `_integrals` do."""
+        key = self.first_key + (level - self.low) / (self.high - self.low)
+        j = bisect_right(self.keys, key) - 1
+        r, x = _GUESSES[j], self.keys[j]
+        if key > x:
+            r = (_GUESSES[j + 1] - r) / (self.keys[j + 1] - x) * (key - x) + r
+        reach = _SPACING * (math.sqrt(1.0 - r * r) + _SPACING)
+        first, last = max(r - reach, -1.0), min(r + reach, 1.0)
+        for _ in range(_STEPS):
+            off, slope = _polynomial(self.degree, r) - level, _polynomial(self.slopes, r)
+            if slope > 0.0 and abs(off) > _NOISE:
+                r = min(max(r - off / slope, first), last)
+        area = self.half * (_polynomial(self.integral, r) + level * (1.0 - r))
+        lever = _polynomial(self.lever, r) + level * (1.0 - r * r) / 2
+        return area, self.middle * area + self.sign * self.half * self.half * lever
+
+
+def _polynomial(coefficients: Sequence[float], r: float) -> float:
+    total = coefficients[0]
+    power = 1.0
+    for coefficient in coefficients[1:]:
+        power *= r
+        total += coefficient * power
+    return total
 
 
 def _summed(factors: Array, rows: Array) -> Array:

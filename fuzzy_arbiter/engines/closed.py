@@ -21,7 +21,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
-from fuzzy_arbiter.engines.clipped_centroid_batch import Centroid
+from fuzzy_arbiter.engines.clipped_centroid import Centroid
 from fuzzy_arbiter.engines.engine import Engine, Shortcut
 from fuzzy_arbiter.engines.normal_form import Literal, NoClosedFormError, high_clauses, ladder
 from fuzzy_arbiter.engines.supported import unsupported_reason

@@ -25,8 +25,8 @@ _LIKELY = 0.95  # minimum height at the points around a maximum, as a fraction o
 def of_points(quad: Quadrature, cuts: Array) -> float:
     """Return the mean of the singletons, weighted by their heights: what very narrow terms of one width tend to."""
     joined = [
-        (shape.parameters[0], float(implication(cut, np.array([shape.height]))[0]))
-        for cut, implication, t in zip(cuts, quad._implications, quad._term, strict=True)
+        (shape.parameters[0], implication.number(cut, shape.height))
+        for cut, implication, t in zip(cuts.tolist(), quad.implications, quad._term, strict=True)
         if isinstance(shape := quad._shapes[t], Curve) and shape.kind == "singleton"
     ]
     weight = sum(height for _, height in joined)

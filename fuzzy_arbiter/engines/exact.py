@@ -7,7 +7,7 @@ from contextlib import suppress
 from typing import ClassVar
 
 from fuzzy_arbiter.definition import Output, System, variable_names
-from fuzzy_arbiter.engines.clipped_centroid_batch import Centroid
+from fuzzy_arbiter.engines.clipped_centroid import Centroid
 from fuzzy_arbiter.engines.clipped_curves import ClippedCurves
 from fuzzy_arbiter.engines.engine import Defuzzifier, Engine
 from fuzzy_arbiter.engines.firing import Slot, slots_of

@@ -1,9 +1,10 @@
 """Outputs of any terms, norms and defuzzifiers, for many samples at once."""
 
-# The joined terms of a sample bend where a term does, where one meets its cut, and where two cross. Between these
-# points they are smooth, and Gauss-Legendre quadrature of one order integrates them. The ends of the panels that
-# suit the terms are known before; a panel in which the joined terms of a sample bend is divided there, and one that is
-# too rough in its middle, until the error of all panels is within the tolerance.
+# The joined terms of a sample bend where a term does, and where a comparison in the formula of a norm changes: where a
+# term meets its cut, where two cross, where a sum reaches 1. Between these points they are smooth, and Gauss-Legendre
+# quadrature of one order integrates them. The ends of the panels that suit the terms are known before; a panel in which
+# the joined terms of a sample bend is divided there, and one that is too rough in its middle, until the error of all
+# panels is within the tolerance.
 
 from __future__ import annotations
 
@@ -43,20 +44,18 @@ _ROUNDS = 60  # maximum number of divisions of a panel
 _MAX_PANELS = 4000  # maximum number of panels of a sample that are divided at a time
 _MAX_TABLE = 2**25  # maximum number of degrees at the points of the terms' panels
 _BLOCK = 2**17  # number of degrees that are computed at a time
-_TIED = 1e-12  # heights count as equal if their quotient differs from 1 by less
+_TIED = 1e-12  # sides of a comparison count as equal if their quotient differs from 1 by less
 _NOISE = 4e-16  # error of a height by rounding, as a fraction of it, or of 1 where it is a difference from 1
-_CLOSE = 0.2  # distance below the maximum height at which a slot may pass it between two points
-_LEVEL, _PAIR, _FULL, _PASSED = range(4)  # a slot meets a level, another slot; it and those before sum to 1, are equal
+_CLOSE = 0.2  # distance of two sides at which they may pass each other between two points, as a fraction of the greater
 
 
-class Events(NamedTuple):
-    """Points where the joined terms bend, each between two quadrature points, before they are located."""
+class Sides(NamedTuple):
+    """Both sides of a comparison in a formula by which a slot is implied or joined."""
 
-    items: Indices  # panel of each
-    first: Indices  # the point before it
-    kinds: Indices  # `_LEVEL`, `_PAIR`, `_FULL` or `_PASSED`
-    one: Indices  # its level, or its slot
-    other: Indices  # the other slot of a pair
+    slot: int
+    turns: bool  # False if their difference only rises or only falls in a panel
+    left: Array
+    right: Array
 
 
 class Joined(NamedTuple):
@@ -64,8 +63,13 @@ class Joined(NamedTuple):
 
     degrees: list[Array]  # of each term
     implied: list[Array]  # of each slot
-    before: list[Array]  # join of the slots before each; for operators that bend where sums reach 1
-    height: Array
+    joins: list[Array]  # of each slot and those before it
+    sides: list[Sides]
+
+    @property
+    def height(self) -> Array:
+        """Height of the join of all slots."""
+        return self.joins[-1]
 
 
 class Quadrature(Defuzzifier):
@@ -76,10 +80,9 @@ class Quadrature(Defuzzifier):
         used = sorted({slot.term for slot in slots})
         self._term = [used.index(slot.term) for slot in slots]
         self._shapes = [s for j in used if isinstance(s := output.terms[j].shape, Membership)]
-        self._implications = [T_NORMS[slot.implication].array for slot in slots]
-        self._join = AGGREGATIONS[output.aggregation].array
-        self._max = output.aggregation == "max"
-        self._sums = output.aggregation in ("bounded_sum", "normalized_sum", "nilpotent_maximum")
+        self.implications = [T_NORMS[slot.implication] for slot in slots]
+        self._join = AGGREGATIONS[output.aggregation]
+        self.is_max = output.aggregation == "max"
         self.low, self.width = output.universe[0], output.universe[1] - output.universe[0]
         self.precision = 4e-16 * max(abs(self.low), abs(output.universe[1]))
         self.edges = smooth_panels(output.universe, self._shapes)
@@ -96,16 +99,10 @@ class Quadrature(Defuzzifier):
         ]
         self._drastic = output.aggregation == "drastic_sum" or any(s.implication == "drastic_product" for s in slots)
         self._table = self._all_degrees(positions)
-        # slot and True for its cut, False for 1 less its cut: levels of its term's degree at which its height bends
         words = [slot.implication for slot in slots]
-        self._levels = [
-            *((i, True) for i, word in enumerate(words) if word in ("min", "nilpotent_minimum")),
-            *((i, False) for i, word in enumerate(words) if word in ("bounded_difference", "nilpotent_minimum")),
-        ]
-        self._jumps = "nilpotent_minimum" in words
         self.noise = _NOISE if "bounded_difference" in words else 0.0
-        self._clip = {i: e for e, (i, cuts) in enumerate(self._levels) if cuts}
-        self._turning = [not self._shapes[self._term[i]].monotonic for i, _ in self._levels]
+        self._clips = [word in ("min", "nilpotent_minimum") for word in words]
+        self._turns = [not self._shapes[t].monotonic for t in self._term]
         self.method = self._method(words)
 
     def _method(self, words: Sequence[str]) -> str:
@@ -130,13 +127,17 @@ class Quadrature(Defuzzifier):
 
     def joined(self, degrees: list[Array], cuts: Array) -> Joined:
         """Return heights of the slots and of their join, for degrees of the terms and cuts of the slots."""
-        slots = zip(self._implications, cuts, self._term, strict=True)
-        implied = [implication(cut, degrees[t]) for implication, cut, t in slots]
-        height, before = np.zeros(degrees[0].shape), []
-        for one in implied:
-            before += [height] if self._sums else []
-            height = np.asarray(self._join(height, one))
-        return Joined(degrees, implied, before, height)
+        result = Joined(degrees, [], [], [])
+        height = np.zeros(degrees[0].shape)
+        for i, (implication, cut, t) in enumerate(zip(self.implications, cuts, self._term, strict=True)):
+            implied = implication.array(cut, degrees[t])
+            result.sides.extend(Sides(i, self._turns[i], *sides) for sides in implication.sides(cut, degrees[t]))
+            if i:
+                result.sides.extend(Sides(i, True, *sides) for sides in self._join.sides(height, implied))
+            height = self._join.array(height, implied)
+            result.implied.append(implied)
+            result.joins.append(height)
+        return result
 
     def heights(self, positions: Array, cuts: Array) -> Joined:
         """Return heights at positions, an array of any shape, for cuts of the same shape."""
@@ -158,36 +159,17 @@ class Quadrature(Defuzzifier):
         """Return heights at the points of the terms' own panels."""
         return self.joined([table[panels] for table in self._table], cuts[:, rows][..., None])
 
-    def level(self, event: int, cuts: Array) -> Array:
-        """Return the degree at which a slot's height bends."""
-        i, is_cut = self._levels[event]
-        return np.asarray(cuts[i] if is_cut else 1.0 - cuts[i])
-
-    def margins(self, joined: Joined, cuts: Array, kinds: Indices, one: Indices, other: Indices) -> Array:
-        """Return for each position a value whose sign changes at its event, for heights of the shape (positions,)."""
-        result, indices = np.empty(len(kinds)), np.arange(len(kinds))
-        implied = np.array(joined.implied)
-        for event in range(len(self._levels)):
-            mine = (kinds == _LEVEL) & (one == event)
-            result[mine] = (joined.degrees[self._term[self._levels[event][0]]] - self.level(event, cuts))[mine]
-        pairs, slots = kinds == _PAIR, np.where(kinds == _LEVEL, 0, one)
-        result[pairs] = (implied[slots, indices] - implied[other, indices])[pairs]
-        if self._sums:
-            first, second = np.array(joined.before)[slots, indices], implied[slots, indices]
-            result[kinds == _FULL] = (first + second - 1.0)[kinds == _FULL]
-            result[kinds == _PASSED] = (second - first)[kinds == _PASSED]
-        return result
-
-    def flat(self, joined: Joined, cuts: Array, panels: Indices, top_slots: Indices) -> Mask:
-        """Return True for panels of constant height; `top_slots` are the highest in their middles."""
-        if not self._max:
+    def flat(self, joined: Joined, cuts: Array, panels: Indices) -> Mask:
+        """Return True for panels of constant height."""
+        if not self.is_max:
             return np.asarray(np.ptp(joined.height, axis=1) <= 4e-16 * joined.height.max(axis=1))
+        middles = np.array([implied[:, 4] for implied in joined.implied])
         result = np.zeros(len(panels), dtype=bool)
         for i, t in enumerate(self._term):
             constant = self._constant[t][panels]
-            if i in self._clip:
-                constant = constant | (joined.degrees[t][:, 4] > self.level(self._clip[i], cuts)[:, 0])
-            result |= constant & (top_slots == i)
+            if self._clips[i]:
+                constant = constant | (joined.degrees[t][:, 4] > cuts[i, :, 0])
+            result |= constant & (middles.argmax(axis=0) == i)
         return result
 
 
@@ -239,7 +221,7 @@ class Samples:
             areas = (inner * WEIGHTS).sum(axis=-1) * half
             moments = (inner * WEIGHTS * (positions[:, INNER] - quad.low)).sum(axis=-1) * half
             estimate = total + np.bincount(rows, areas, self.n)
-            items, breaks, top_slots = self._bends(joined, rows, starts, ends, positions)
+            items, breaks = self._bends(joined, rows, starts, ends, positions)
             errors = mean_errors(joined.height)
             accurate = errors * 2 * half <= _TOLERANCE * estimate[rows]
             accurate |= (errors <= _NOISE * inner.max(axis=1)) | (errors <= quad.noise) | (ends - starts <= narrowest)
@@ -251,7 +233,7 @@ class Samples:
                 items, breaks = items[:0], breaks[:0]
             finished = np.ones(len(rows), dtype=bool)
             finished[items] = False
-            flat = quad.flat(joined, self.cuts[:, rows][..., None], base, top_slots)
+            flat = quad.flat(joined, self.cuts[:, rows][..., None], base)
             finished_panels.append(Panels(rows, starts, ends, joined.height, flat, areas, moments).chosen(finished))
             total = total + np.bincount(rows[finished], areas[finished], self.n)
             if len(items) == 0:
@@ -267,85 +249,48 @@ class Samples:
 
     def _bends(
         self, joined: Joined, rows: Indices, starts: Array, ends: Array, positions: Array
-    ) -> tuple[Indices, Array, Indices]:
-        """Return panels, where in them the joined terms bend, and the highest slot in each panel's middle."""
-        quad, cuts = self.quad, self.cuts[:, rows][..., None]
-        wide = ends - starts > NARROWEST * 10 * quad.width
-        fires = wide & (cuts[..., 0] > 0.0)  # of each slot
-        events: list[Events] = []
-        minima: list[tuple[Indices, Array]] = []
-
-        def add_changes(above: Mask, slot: int, kind: int, one: int, within: Mask | bool = True) -> Mask:
-            """Add the points after which a margin has another sign; return the wide panels without one."""
-            change = (above[:, 1:] != above[:, :-1]) & fires[slot][:, None] & within
+    ) -> tuple[Indices, Array]:
+        """Return panels, and where in them the joined terms bend."""
+        wide = ends - starts > NARROWEST * 10 * self.quad.width
+        events: list[tuple[Indices, Indices, Indices]] = []  # panel, the point before it, and the comparison's index
+        minima: list[tuple[Indices, Array]] = []  # panels, and where two sides may meet between two points
+        for k, (slot, turns, left, right) in enumerate(joined.sides):
+            margin, sizes = np.abs(left - right), np.maximum(np.abs(left), np.abs(right))
+            above = (left > right) & (margin > _TIED * sizes)
+            below = (left < right) & (margin > _TIED * sizes)
+            change = (above[:, 1:] & below[:, :-1]) | (below[:, 1:] & above[:, :-1])
+            change &= wide[:, None]
+            chosen = wide
+            if self.quad.is_max:  # what is below later slots does not matter
+                is_top = joined.joins[slot] == joined.height
+                change &= is_top[:, 1:] | is_top[:, :-1]
+                chosen = wide & is_top.any(axis=1)
             items, first = np.nonzero(change)
-            events.append(Events(items, first, *(np.full(len(items), x) for x in (kind, one, 0))))
-            return np.asarray(wide & ~change.any(axis=1))
-
-        def add_minima(values: Array, chosen: Mask, scale: Array) -> None:
-            """Add the positions at which values may come to 0 between two points."""
-            items = np.flatnonzero(chosen & (values.min(axis=1) < _CLOSE * scale))
-            with np.errstate(divide="ignore", invalid="ignore"):
-                near, offset = lowest_between(values[items] / scale[items][:, None])
-            items, offset = items[near], offset[near]
-            minima.append((items, (starts[items] + ends[items]) / 2 + offset * (ends[items] - starts[items]) / 2))
-
-        unit = np.ones(len(rows))
-        top_slots = np.zeros(joined.height.shape, dtype=np.intp)
-        if quad._max:
-            top = np.zeros(joined.height.shape)
-            for i, height in enumerate(joined.implied):
-                np.copyto(top_slots, i, where=height > top)
-                np.maximum(top, height, out=top)
-            events.append(_passes(joined, top_slots, wide))
-        for event, (i, clips) in enumerate(quad._levels):
-            margin = joined.degrees[quad._term[i]] - quad.level(event, cuts)
-            within: Mask | bool = True
-            if quad._max:
-                mine = top_slots == i
-                # below a level other than its cut a slot is 0, so that none is the greatest
-                within = mine[:, 1:] & mine[:, :-1] if clips and not quad._jumps else mine[:, 1:] | mine[:, :-1]
-            # above: not where it rounds to its cut, as a curve at its top does
-            without_change = add_changes(margin > 0.0, i, _LEVEL, event, within)
-            if quad._turning[event]:
-                add_minima(np.abs(margin), without_change, unit)
-        for i in range(1, len(joined.before)):
-            before, one = joined.before[i], joined.implied[i]
-            add_minima(np.abs(before + one - 1.0), add_changes(before + one - 1.0 >= 0.0, i, _FULL, i), unit)
-            if quad.output.aggregation == "nilpotent_maximum":
-                add_minima(np.abs(one - before), add_changes(one - before >= 0.0, i, _PASSED, i), unit)
-        if quad._max and len(joined.implied) > 1:
-            scale = joined.height.max(axis=1)
-            for i, height in enumerate(joined.implied):
-                below = joined.height - height
-                add_minima(below, fires[i] & (top_slots != i).all(axis=1), scale)
+            events.append((items, first, np.full(len(items), k)))
+            if turns:
+                size = sizes.max(axis=1)
+                items = np.flatnonzero(chosen & ~change.any(axis=1) & (margin.min(axis=1) < _CLOSE * size))
+                near, offset = lowest_between(margin[items] / size[items][:, None])
+                items, offset = items[near], offset[near]
+                minima.append((items, (starts[items] + ends[items]) / 2 + offset * (ends[items] - starts[items]) / 2))
         items, breaks = self._located(events, rows, positions)
         inside = (breaks > starts[items]) & (breaks < ends[items])
-        parts = [(items[inside], breaks[inside]), *minima]
-        items, breaks = (np.concatenate(column) for column in zip(*parts, strict=True))
-        return items, breaks, top_slots[:, 4]
+        items, breaks = (np.concatenate(x) for x in zip((items[inside], breaks[inside]), *minima, strict=True))
+        return items, breaks
 
-    def _located(self, parts: Sequence[Events], rows: Indices, positions: Array) -> tuple[Indices, Array]:
-        """Locate events by their roots; return their panels and positions."""
-        if not sum(len(part.items) for part in parts):
-            return np.zeros(0, dtype=np.intp), np.zeros(0)
-        events = Events(*map(np.concatenate, zip(*parts, strict=True)))
+    def _located(
+        self, events: Sequence[tuple[Indices, Indices, Indices]], rows: Indices, positions: Array
+    ) -> tuple[Indices, Array]:
+        """Return the panel of each event, and where two sides are equal."""
+        none = np.zeros(0, dtype=np.intp)
+        items, first, compared = (np.concatenate(column) for column in zip((none, none, none), *events, strict=True))
 
         def margin(x: Array, which: Indices) -> Array:
-            cuts = self.cuts[:, rows[events.items[which]]]
-            joined = self.quad.heights(x, cuts)
-            return self.quad.margins(joined, cuts, events.kinds[which], events.one[which], events.other[which])
+            sides = self.heights(x, rows[items[which]]).sides
+            margins = np.array([np.broadcast_to(left - right, x.shape) for _, _, left, right in sides])
+            return np.asarray(margins[compared[which], np.arange(len(x))])
 
-        x0, x1 = positions[events.items, events.first], positions[events.items, events.first + 1]
-        positions, ok = roots(margin, x0, x1, self.quad.precision)
-        return events.items[ok], positions[ok]
-
-
-def _passes(joined: Joined, top_slots: Indices, wide: Mask) -> Events:
-    """Return the points after which another slot is the greatest."""
-    items, first = np.nonzero((top_slots[:, 1:] != top_slots[:, :-1]) & wide[:, None])
-    a, b = top_slots[items, first], top_slots[items, first + 1]
-    implied, order = np.array([height[items] for height in joined.implied]), np.arange(len(items))
-    before = implied[b, order, first] < implied[a, order, first] * (1.0 - _TIED)
-    after = implied[a, order, first + 1] < implied[b, order, first + 1] * (1.0 - _TIED)
-    return Events(*(column[before & after] for column in (items, first, np.full(len(items), _PAIR), a, b)))
+        if not len(items):
+            return none, np.zeros(0)
+        middles, ok = roots(margin, positions[items, first], positions[items, first + 1], self.quad.precision)
+        return items[ok], middles[ok]

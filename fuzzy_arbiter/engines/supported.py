@@ -10,7 +10,7 @@ from fuzzy_arbiter.terms.curves import Curve
 PLAIN = {"conjunction": ("min", "prod"), "disjunction": ("max", "probor"), "implication": ("min", "prod")}
 
 
-def unsupported_reason(system: System, curved_inputs: bool = False, any_outputs: bool = False) -> str:
+def unsupported_reason(system: System, curved_inputs: bool = False) -> str:
     """Return the first reason why a system is not of the plain kind, which some engines and checks require."""
     for key, known in PLAIN.items():
         if getattr(system, key) not in known:
@@ -24,8 +24,7 @@ def unsupported_reason(system: System, curved_inputs: bool = False, any_outputs:
             return f"R{i + 1} asks for the output {output_name!r}, expected conditions on inputs alone"
         if bent(rule.condition):
             return f"R{i + 1} has a hedge or 'any', expected 'not' alone"
-    joined = () if any_outputs else system.outputs
-    for output in joined:
+    for output in system.outputs:
         if (output.defuzzifier, output.aggregation) != ("centroid", "max"):
             return (
                 f"output {output.name!r} has the defuzzifier {output.defuzzifier} and the aggregation "
@@ -33,7 +32,7 @@ def unsupported_reason(system: System, curved_inputs: bool = False, any_outputs:
             )
         if output.lock_previous:
             return f"output {output.name!r} keeps its previous value, expected none that does"
-    for variable in (*(() if curved_inputs else system.inputs), *joined):
+    for variable in (*(() if curved_inputs else system.inputs), *system.outputs):
         if reason := curved_term(variable):
             return reason
     return ""

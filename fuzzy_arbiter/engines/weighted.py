@@ -10,7 +10,7 @@ import numpy as np
 from fuzzy_arbiter.definition import Output
 from fuzzy_arbiter.engines.engine import Defuzzifier
 from fuzzy_arbiter.shapes import Array
-from fuzzy_arbiter.terms.values import Constant, Value, place_of
+from fuzzy_arbiter.terms.values import Constant, Value
 
 
 class Weighted(Defuzzifier):
@@ -56,7 +56,7 @@ def value_function(shape: Any, inputs: Sequence[str], outputs: Sequence[str]) ->
 
     def position(cut: Any, columns: Any) -> Any:
         if isinstance(cut, np.ndarray):  # a strength of 0 has no weight, so that its position does not matter
-            return np.array([place_of(shape, w) if w > 0.0 else 0.0 for w in cut.tolist()])
-        return place_of(shape, cut)
+            return np.array([shape.place_of(w) if w > 0.0 else 0.0 for w in cut.tolist()])
+        return shape.place_of(cut)
 
     return position

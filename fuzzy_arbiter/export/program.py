@@ -10,8 +10,7 @@ from functools import partial
 from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines import choose as choose_engine
-from fuzzy_arbiter.engines.clipped_centroid import Outline, outline
-from fuzzy_arbiter.engines.clipped_centroid_batch import Centroid
+from fuzzy_arbiter.engines.clipped_centroid import Centroid, Outline, outline
 from fuzzy_arbiter.engines.clipped_curves import ClippedCurves, with_crossings
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.engine import Engine

@@ -12,7 +12,7 @@ import numpy as np
 from fuzzy_arbiter.checks import finite, finite_numbers, shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.shapes import Array, Membership
-from fuzzy_arbiter.terms.expressions import Expression, array_function, number_function
+from fuzzy_arbiter.terms.expressions import Expression, evaluator
 from fuzzy_arbiter.terms.kinds import KINDS
 from fuzzy_arbiter.terms.parser import Node
 
@@ -70,7 +70,7 @@ class Curve(Membership):
         pieces = [(end, _tree(text, named, height)) for end, text in kind.pieces(*numbers)]
         ends, trees = zip(*pieces, strict=True)
         computed = {"parameters": numbers, "height": height, "ends": ends, "trees": trees}
-        computed |= {"_numbers": tuple(map(number_function, trees)), "_arrays": tuple(map(array_function, trees))}
+        computed |= {f"_{kind}s": tuple(evaluator(tree, kind) for tree in trees) for kind in ("number", "array")}
         for key, value in computed.items():
             object.__setattr__(self, key, value)
         jumps = (x for i, x in enumerate(ends[:-1]) if abs(self._side(i, x) - self._side(i + 1, x)) > 1e-9)

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -37,8 +37,8 @@ class Expression:
         tree = parsed(self.text) if self.tree is None else self.tree
         object.__setattr__(self, "tree", tree)
         object.__setattr__(self, "text", said(tree))
-        object.__setattr__(self, "_number", number_function(tree))
-        object.__setattr__(self, "_array", array_function(tree))
+        object.__setattr__(self, "_number", evaluator(tree, "number"))
+        object.__setattr__(self, "_array", evaluator(tree, "array"))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Expression, (self.text, self.tree)
@@ -79,28 +79,17 @@ def _bound(node: Node, values: Mapping[str, float]) -> Node:
     return (node[0], *parts)
 
 
-def number_function(node: Node) -> Callable[[Mapping[str, float]], float]:
-    """Return a function that evaluates a tree on numbers."""
+def evaluator(node: Node, kind: Literal["number", "array"]) -> Callable[[Mapping[str, Any]], Any]:
+    """Return a function that evaluates a tree on numbers or on arrays."""
     if isinstance(node, float):
         return lambda values: node
     if isinstance(node, str):
         return lambda values: values[node]
-    function, parts = ALL[node[0]].number, [number_function(part) for part in node[1:]]
-    if len(parts) == 1:
-        (one,) = parts
-        return lambda values: function(one(values))
-    first, second = parts
+    function, (first, *others) = getattr(ALL[node[0]], kind), [evaluator(part, kind) for part in node[1:]]
+    if not others:
+        return lambda values: function(first(values))
+    (second,) = others
     return lambda values: function(first(values), second(values))
-
-
-def array_function(node: Node) -> Callable[[Mapping[str, Any]], Any]:
-    """Return a function that evaluates a tree on arrays."""
-    if isinstance(node, float):
-        return lambda values: node
-    if isinstance(node, str):
-        return lambda values: values[node]
-    function, parts = ALL[node[0]].array, [array_function(part) for part in node[1:]]
-    return lambda values: function(*(part(values) for part in parts))
 
 
 def said(node: Node) -> str:

@@ -46,28 +46,17 @@ def _multiplied(first: Pieces, second: Pieces) -> Pieces:
     return [(end, f"({at(first, end)}) * ({at(second, end)})") for end in ends]
 
 
-def _s(start: float, end: float, names: tuple[str, str] = ("start", "end")) -> Pieces:
+def _s(start: float, end: float, names: tuple[str, str] = ("start", "end"), rises: bool = True) -> Pieces:
+    foot, top = names if rises else names[::-1]
+    low, high = f"2 * ((x - {foot}) / ({top} - {foot})) ^ 2", f"1 - 2 * ((x - {top}) / ({top} - {foot})) ^ 2"
+    texts = ("0", low, high, "1") if rises else ("1", high, low, "0")
     if start == end:
-        return [(start, "0"), (_END, "1")]
-    a, b = names
-    return [
-        (start, "0"),
-        ((start + end) / 2, f"2 * ((x - {a}) / ({b} - {a})) ^ 2"),
-        (end, f"1 - 2 * ((x - {b}) / ({b} - {a})) ^ 2"),
-        (_END, "1"),
-    ]
+        return [(start, texts[0]), (_END, texts[-1])]
+    return list(zip((start, (start + end) / 2, end, _END), texts, strict=True))
 
 
 def _z(start: float, end: float, names: tuple[str, str] = ("start", "end")) -> Pieces:
-    if start == end:
-        return [(start, "1"), (_END, "0")]
-    a, b = names
-    return [
-        (start, "1"),
-        ((start + end) / 2, f"1 - 2 * ((x - {a}) / ({b} - {a})) ^ 2"),
-        (end, f"2 * ((x - {b}) / ({b} - {a})) ^ 2"),
-        (_END, "0"),
-    ]
+    return _s(start, end, names, rises=False)
 
 
 def _gaussian(mean: str, deviation: str) -> str:

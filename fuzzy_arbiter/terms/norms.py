@@ -31,10 +31,14 @@ class Operator:
     fcl: str = ""
     number: Callable[..., float] = field(init=False, repr=False, compare=False)  # on numbers
     _arrays: Callable[[dict[str, Any]], Any] = field(init=False, repr=False, compare=False)
+    _sides: tuple[tuple[Callable[[dict[str, Any]], Any], ...], ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        tree = ast.parse(self.formula, mode="eval").body
+        compared = [(n.left, n.comparators[0]) for n in ast.walk(tree) if isinstance(n, ast.Compare) and _bends(n)]
         object.__setattr__(self, "number", compute(self.formula))
-        object.__setattr__(self, "_arrays", _vectorized(ast.parse(self.formula, mode="eval").body))
+        object.__setattr__(self, "_arrays", _vectorized(tree))
+        object.__setattr__(self, "_sides", tuple(tuple(map(_vectorized, sides)) for sides in compared))
 
     @property
     def function(self) -> str:
@@ -45,6 +49,17 @@ class Operator:
         """Return the result for arrays, or an array and a number, of each as `number` gives it."""
         with np.errstate(all="ignore"):
             return np.asarray(self._arrays(dict(zip("ab", degrees, strict=False))))
+
+    def sides(self, *degrees: Any) -> list[tuple[Any, Any]]:
+        """Return both sides of each comparison in the formula, for arrays: where they are equal the result bends."""
+        values = dict(zip("ab", degrees, strict=False))
+        return [(left(values), right(values)) for left, right in self._sides]
+
+
+def _bends(test: ast.Compare) -> bool:
+    """Return True for a comparison of two degrees, which is no guard against a division by 0."""
+    bound = test.comparators[0]
+    return not isinstance(test.ops[0], ast.Eq) and not (isinstance(bound, ast.Constant) and bound.value == 1e-308)
 
 
 def _vectorized(node: ast.expr) -> Callable[[dict[str, Any]], Any]:

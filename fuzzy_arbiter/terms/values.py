@@ -11,8 +11,7 @@ import numpy as np
 
 from fuzzy_arbiter.checks import all_of, finite, finite_numbers, shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.shapes import Array, Membership, Shape
-from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.shapes import Array, Membership
 from fuzzy_arbiter.terms.expressions import Expression
 from fuzzy_arbiter.terms.parser import Node
 
@@ -197,20 +196,3 @@ class Formula(Value, Membership):
                 f"expression {shown(self.text)} gives {float(values[i]):g} at x = {positions[i]:g}, expected at most 1"
             )
         return self
-
-
-def invertible(shape: object) -> bool:
-    """Return True if a term only rises or only falls, so that each degree has a position, for Tsukamoto's method."""
-    return (isinstance(shape, Curve) and shape.invertible) or (isinstance(shape, Shape) and _is_ramp(shape))
-
-
-def _is_ramp(shape: Shape) -> bool:
-    return len(shape.points) == 2 and not shape.jumps and min(y for _, y in shape.points) == 0.0
-
-
-def place_of(shape: Curve | Shape, degree: float) -> float:
-    """Return the position at which a monotonic term has a degree."""
-    if isinstance(shape, Curve):
-        return shape.place_of(degree)
-    (a, left), (b, right) = shape.points
-    return a + (b - a) * ((degree - left) / (right - left))

@@ -17,7 +17,7 @@ from fuzzy_arbiter.verification.cells import Domain, crisp, graded, ranked
 from fuzzy_arbiter.verification.search import Answer, Goal, Group, Search
 
 SUPPORT = (0.0, 1.0)
-FIRES, FULLY = 1, 2  # ranks to exceed, of the degrees 0, between, and 1
+FULL = math.nextafter(1.0, 0.0)  # strength that only the strength 1 exceeds
 ANY = 2**30  # number of groups that is never reached, for no upper limit
 SAMPLES = 4096  # maximum number of sampled combinations
 SEARCHES = 8  # which share the effort
@@ -97,23 +97,24 @@ class Questions:
         pairs = zip(self._system.rules, self._conditions, strict=True)
         return [(rule, condition) for rule, condition in pairs if statement in rule.conclusions]
 
-    def firing(self, statement: Is) -> Group:
-        """Return the group of rules that conclude a statement at any strength."""
-        return tuple((condition, FIRES) for _, condition in self.rules_on(statement))
-
-    def fully(self, statement: Is) -> Group:
-        """Return the group of rules that conclude a statement at strength 1."""
-        return tuple((condition, FULLY) for rule, condition in self.rules_on(statement) if rule.weight == 1.0)
-
-    def above_half(self, statement: Is) -> Group:
-        """Return the group of rules that conclude a statement above 1/2."""
-        chosen = [(rule, condition) for rule, condition in self.rules_on(statement) if rule.weight > 0.5]
-        ranks = ranked(np.array([0.5 / rule.weight for rule, _ in chosen]), self._levels).tolist()
+    def group(self, statement: Is, above: float = 0.0) -> Group:
+        """Return the group of rules that conclude a statement at a strength above a number."""
+        chosen = [(rule, condition) for rule, condition in self.rules_on(statement) if rule.weight > above]
+        ranks = ranked(np.array([above / rule.weight for rule, _ in chosen]), self._levels).tolist()
         return tuple((condition, rank) for (_, condition), rank in zip(chosen, ranks, strict=True))
+
+    def two_of(self, statements: Sequence[Is], above: float) -> Goal:
+        """Return the goal that rules conclude two of some statements at a strength above a number."""
+        return Goal(tuple(self.group(statement, above) for statement in statements), 2, ANY)
+
+    def none_of(self, statements: Sequence[Is], above: float = 0.0) -> Goal:
+        """Return the goal that rules conclude none of some statements at a strength above a number."""
+        return Goal(tuple(self.group(statement, above) for statement in statements), 0, 0)
 
     def each(self) -> list[Group]:
         """Return a group for each rule, at any strength."""
-        return [((condition, FIRES),) for condition in self._conditions]
+        (fires,) = ranked(np.zeros(1), self._levels).tolist()
+        return [((condition, fires),) for condition in self._conditions]
 
     def ask(self, goals: Sequence[Goal], max_boxes: int = 1) -> list[Answer]:
         """Search for the goals; goals with the same inputs share a search."""

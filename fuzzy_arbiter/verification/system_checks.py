@@ -18,7 +18,15 @@ from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.rule import Operators
 from fuzzy_arbiter.shapes import Array
 from fuzzy_arbiter.verification.cells import Stretch, stretches
-from fuzzy_arbiter.verification.questions import ANY, SAMPLES, Questions, conditions_on_inputs, greatest_term, reach
+from fuzzy_arbiter.verification.questions import (
+    ANY,
+    FULL,
+    SAMPLES,
+    Questions,
+    conditions_on_inputs,
+    greatest_term,
+    reach,
+)
 from fuzzy_arbiter.verification.report import Check, Finding, Place, Row, Severity, Verification
 from fuzzy_arbiter.verification.rules import labels, redundant, unused
 from fuzzy_arbiter.verification.search import Answer, Goal
@@ -118,24 +126,21 @@ class _Checks:
         """Check the conclusions on crisp rows."""
         ask = Questions.of_rows(self.system, self._effort)
 
-        def add_findings(severity: Severity, name: str, answer: Answer, text: str, terms: Sequence[Is]) -> None:
-            for place in map(ask.places, answer.boxes):
-                strengths = _row_strengths(self.system, place)
-                causes = _causes(self.system, strengths, terms, 1.0 if name == "consistent" else 0.5)
-                self._add(severity, name, f"{text} where {_format_place(place)}: {causes}", place)
+        def find(severity: Severity, name: str, sets: Mapping[str, tuple[Is, ...]], above: float, text: str) -> Answer:
+            answers = ask.ask([ask.two_of(terms, above) for terms in sets.values()])
+            for (output, terms), answer in zip(sets.items(), answers, strict=True):
+                for place in map(ask.places, answer.boxes):
+                    causes = _causes(self.system, _row_strengths(self.system, place), terms, above)
+                    self._add(severity, name, f"{text.format(output)} where {_format_place(place)}: {causes}", place)
+            self._decided(name, answers, _ROWS)
+            return answers[-1]
 
-        answers = ask.ask([Goal(tuple(map(ask.fully, terms)), 2, ANY) for terms in self._terms.values()])
-        for (output, terms), answer in zip(self._terms.items(), answers, strict=True):
-            add_findings("fault", "consistent", answer, f"output {output!r}: rules contradict each other", terms)
-        self._decided("consistent", answers, _ROWS)
-        high = tuple(map(ask.above_half, self._high))
-        (answer,) = ask.ask([Goal(high, 2, ANY)])
-        add_findings("warning", "exclusive", answer, f"two outputs are {self._highs}", self._high)
-        self._decided("exclusive", [answer], _ROWS)
-        if len(high) == 1:
+        find("fault", "consistent", self._terms, FULL, "output {!r}: rules contradict each other")
+        answer = find("warning", "exclusive", {"": self._high}, 0.5, f"two outputs are {self._highs}")
+        if len(self._high) == 1:
             return
         more = ": at most one is, not exactly one" if answer.is_complete and not answer.boxes else ""
-        (answer,) = ask.ask([Goal(high, 0, 0)], NAMED_ROWS)
+        (answer,) = ask.ask([ask.none_of(self._high, 0.5)], NAMED_ROWS)
         for place in map(ask.places, answer.boxes):
             self._add("note", "exclusive", f"no output is {self._highs} where {_format_place(place)}{more}", place)
         if not answer.is_complete:
@@ -162,7 +167,7 @@ class _Checks:
             ("graded_consistent", self._terms, "output {!r}: rules put it into two terms, both above 1/2,"),
             ("graded_exclusive", {"": self._high}, f"two outputs are {self._highs}, both above 1/2,"),
         ):
-            answers = ask.ask([Goal(tuple(map(ask.above_half, terms)), 2, ANY) for terms in sets.values()])
+            answers = ask.ask([ask.two_of(terms, 0.5) for terms in sets.values()])
             verdicts, methods = set(), set()
             for (output, terms), answer in zip(sets.items(), answers, strict=True):
                 verdict, method, place = self._both_above_half(ask, terms, answer)
@@ -192,16 +197,9 @@ class _Checks:
     ) -> tuple[Place | None, str]:
         """Return a sample at which strengths of statements, (statements, n), are bad; and the search in words."""
         samples, firing = ask.samples(), Firing(self.system)
-        strengths = firing.strengths(samples)
+        strengths = list(zip(self.system.rules, firing.strengths(samples), strict=True))
         none = np.zeros(len(samples))
-        joined = [
-            functools.reduce(
-                np.maximum,
-                (x for x, rule in zip(strengths, self.system.rules, strict=True) if s in rule.conclusions),
-                none,
-            )
-            for s in statements
-        ]
+        joined = [np.max([none, *(x for rule, x in strengths if s in rule.conclusions)], axis=0) for s in statements]
         rows = np.flatnonzero(is_bad(np.array(joined)))
         if len(rows):
             values = zip(self.system.inputs, samples[rows[0]], strict=True)
@@ -211,7 +209,7 @@ class _Checks:
     def _complete(self, name: str, ask: Questions, where: str) -> None:
         """Check that a rule fires for each output; for norms that may be 0 of positive degrees, by samples."""
         open_ones: list[str] = []
-        answers = ask.ask([Goal(tuple(map(ask.firing, terms)), 0, 0) for terms in self._terms.values()])
+        answers = ask.ask(list(map(ask.none_of, self._terms.values())))
         for output, terms, answer in zip(self.system.outputs, self._terms.values(), answers, strict=True):
             default = "no default" if output.default is None else f"its default {output.default:g} there"
             places = [ask.places(box) for box in answer.boxes]
@@ -256,13 +254,13 @@ def _row_strengths(system: System, place: Mapping[str, float | str]) -> list[flo
 
 
 def _causes(system: System, strengths: Sequence[float], statements: Sequence[Is], above: float) -> str:
-    """Name the rules that conclude statements above a strength, which is 1 at most."""
+    """Name the rules that conclude statements above a strength."""
     parts = []
     for statement in dict.fromkeys(statements):
         rules = [
             f"R{i + 1}"
             for i, (rule, strength) in enumerate(zip(system.rules, strengths, strict=True))
-            if statement in rule.conclusions and (strength > above or strength == above == 1.0)
+            if statement in rule.conclusions and strength > above
         ]
         if rules:
             parts.append(f"{statement} by {' '.join(rules)}")
