@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import ImportLogError
-from cosim.logs.decompression import MAX_PART
+from cosim.logs.bag_records import StoredMessage
+from cosim.logs.decompression import MAX_PART, Decompressor
+from cosim.logs.records import OnProgress
 
 _LIMITS = {  # as SQLite advises for files from others, sqlite.org/security.html
     sqlite3.SQLITE_LIMIT_LENGTH: MAX_PART,
@@ -29,6 +31,7 @@ _PRAGMAS = ("trusted_schema = OFF", "query_only = ON", "cell_size_check = ON", "
 _PLAIN = re.compile(r"CREATE\s+(TABLE|(UNIQUE\s+)?INDEX)\b", re.IGNORECASE)
 _STEPS = 10_000  # instructions between two calls of the handler
 _STEPS_PER_BYTE = 10  # maximum number of instructions for each byte of the file, beyond a million
+_ZSTANDARD = b"\x28\xb5\x2f\xfd"  # first bytes of compressed data, RFC 8878
 _ROW_SIZE = 8  # bytes, minimum size of a row in a file
 
 
@@ -81,3 +84,36 @@ def open_database(path: Path) -> Iterator[BagDatabase]:
     size = path.stat().st_size + (journal.stat().st_size if journal.exists() else 0)
     with contextlib.closing(sqlite3.connect(address, uri=True)) as database:
         yield BagDatabase(database, size)
+
+
+def sqlite_messages(path: Path, on_progress: OnProgress) -> Iterator[StoredMessage]:
+    """Yield the messages of a bag of SQLite."""
+    total, read = path.stat().st_size, 0
+    parts = Decompressor(total)
+    with open_database(path) as database:
+        if not database.tables >= {"topics", "messages"}:
+            raise ImportLogError("is a database without topics and messages, expected a bag of ROS 2")
+        texts: dict[str, tuple[str, str]] = {}
+        if "message_definitions" in database.tables:
+            query = "SELECT topic_type, encoded_message_definition, encoding FROM message_definitions"
+            texts = {name: (text, language) for name, text, language in database.rows(query, str, str, str)}
+        topics = {
+            key: (topic, _three_parts(kind), *texts.get(kind, ("", "")), encoding)
+            for key, topic, kind, encoding in database.rows(
+                "SELECT id, name, type, serialization_format FROM topics", int, str, str, str
+            )
+        }
+        query = "SELECT topic_id, timestamp, data FROM messages ORDER BY id"
+        for topic, stamp, data in database.rows(query, int, int, bytes):
+            if topic not in topics:
+                raise ValueError(f"a message has topic number {topic!r}, expected one of {sorted(topics)}")
+            read += len(data)
+            if data.startswith(_ZSTANDARD):  # the recorder has compressed each message
+                data = parts.decompress("zstd", data)
+            on_progress(min(1.0, read / total))
+            yield StoredMessage(*topics[topic], data, stamp * 1e-9)
+
+
+def _three_parts(kind: str) -> str:
+    """Return a type's name with its part ``msg``, which early recorders omit."""
+    return kind.replace("/", "/msg/") if kind.count("/") == 1 else kind

@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import ImportLogError
-from cosim.logs.bag_storage import DAMAGE, MAX_DECODED, StoredMessage, stored_messages
-from cosim.logs.chunked_file import OnProgress
+from cosim.logs.bag_records import StoredMessage
+from cosim.logs.bag_storage import MAX_DECODED, stored_messages
 from cosim.logs.cleaning.clocks import Clock
+from cosim.logs.records import DAMAGE, OnProgress
 from cosim.logs.spool import LogContents
 from cosim.logs.vehicle_messages import AUTOPILOT, MESSAGES, NO_AUTOPILOT, VehicleMessages
 from cosim.mavlink.wire.dialect import dialect
@@ -35,7 +36,7 @@ def read_recording(
             contents.unread[stored.topic] += 1
         if not (_ONE_KIND.fullmatch(stored.topic) if by_kind else stored.topic == _ALL_MESSAGES):
             continue
-        written, name = clock.time(stored.time), "message"
+        written, name = clock.time(stored.time, stored.topic), "message"
         try:
             header, fields = _parts(stored)
             name = fields["type"]

@@ -20,13 +20,13 @@ from cosim.errors import ImportLogError, RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
 from cosim.logs.assignment import assign_quantities, format_of
-from cosim.logs.chunked_file import OnProgress
 from cosim.logs.cleaning.alignment import clock_offset
 from cosim.logs.cleaning.clocks import VehicleClock
 from cosim.logs.cleaning.topics import Topic
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.forces import CURVES, CommandForces, command_forces
 from cosim.logs.quantities import COMMANDS
+from cosim.logs.records import OnProgress
 from cosim.logs.rows import RowMaker
 from cosim.logs.selection import default_rate, has_plausible_rate, select_topics, time_span
 from cosim.logs.spool import LogContents

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from cosim.errors import ImportLogError
-from cosim.logs.bag_storage import DAMAGE
+from cosim.logs.records import DAMAGE
 
 _MAX_TEXT = 1 << 17  # characters of a definition with its nested types
 _SIGNS = {"ros2msg": ("\n,", 5000), "ros2idl": ("=[<,", 1000)}  # signs that take long to parse, maximum number of them

@@ -24,7 +24,7 @@ ONE_PLACE = {
     "distributed": {"cosim.campaigns.workers.cluster"},
     "foxglove_schemas_protobuf": {"cosim.export.mcap_writer", "cosim.export.foxglove_scene"},
     "google": {"cosim.export.foxglove_scene", "cosim.export.protobuf_table"},
-    "mcap": {"cosim.export.mcap_writer", "cosim.logs.bag_storage"},
+    "mcap": {"cosim.export.mcap_writer"},
     "mcap_protobuf": {"cosim.export.mcap_writer"},
     "gymnasium": {"cosim.learning", "cosim.learning.region_env"},
     "numba": {"fuzzy_arbiter.export.python"},
@@ -33,7 +33,6 @@ ONE_PLACE = {
     "rerun": {"cosim.export.rrd_writer"},
     "rosbags": {
         "cosim.export.rosbag2_writer",
-        "cosim.logs.bag_storage",
         "cosim.logs.formats.bag",
         "cosim.logs.message_definitions",
     },

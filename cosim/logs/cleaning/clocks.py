@@ -10,7 +10,7 @@ from cosim.logs.cleaning.sample_times import is_shuffled
 from cosim.simulation.signals import Array
 
 _MAX_STEP_BACK = 1.0  # s; a step back by more is a jump, not a message out of order
-_MAX_STEP_AHEAD = 3600.0  # s; a step ahead by more is a jump, not a pause
+_MAX_AHEAD = 3600.0  # s; a step ahead by more is a jump, not a pause
 _PAUSE = 1.0  # s, assumed duration of a jump
 _WINDOW = 60.0  # s of the vehicle's clock, in which only the message of smallest delay is used
 _PART = 2**14  # readings that are converted at once
@@ -21,22 +21,28 @@ _MAX_DRIFT = 5e-4  # relative drift above which a fit is discarded
 class Clock:
     """Convert readings of a clock that jumps to rising times; each jump becomes a pause of one second."""
 
+    # A reading that no other one confirms is no jump but damage. Of a bag whose topics are stored one after the other,
+    # each topic has readings that rise.
+
     def __init__(self) -> None:
         self.jumps: list[tuple[float, float]] = []  # converted time [s] and size [s] of each jump
-        self._shift, self._last = 0.0, math.nan
+        self._shift, self._last, self._unconfirmed = 0.0, math.nan, math.nan
+        self._last_of: dict[str, float] = {}  # s, last time of each topic
 
-    def time(self, reading: float) -> float:
-        """Return the time [s] of a clock reading [s], NaN for NaN; call it in the order of the log."""
+    def time(self, reading: float, topic: str = "") -> float:
+        """Return the time [s] of a clock reading [s], NaN for NaN and the first one of a jump, in the log's order."""
         if not math.isfinite(reading):
             return math.nan
-        time = reading + self._shift
-        step = time - self._last
-        if step < -_MAX_STEP_BACK or step > _MAX_STEP_AHEAD:
+        if not -_MAX_STEP_BACK <= reading + self._shift - self._last_of.get(topic, reading + self._shift) <= _MAX_AHEAD:
+            if not -_MAX_STEP_BACK <= reading - self._unconfirmed <= _MAX_AHEAD:
+                self._unconfirmed = reading
+                return math.nan
+            step = self._unconfirmed + self._shift - self._last
             self._shift += _PAUSE - step
-            time = self._last + _PAUSE
-            self.jumps.append((time, step))
-        if time > self._last or math.isnan(self._last):
-            self._last = time
+            self.jumps.append((self._unconfirmed + self._shift, step))
+        time = reading + self._shift
+        self._last = time if math.isnan(self._last) else max(time, self._last)
+        self._last_of[topic] = max(time, self._last_of.get(topic, time))
         return time
 
     def times(self, readings: Array) -> Array:

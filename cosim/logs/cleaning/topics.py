@@ -21,6 +21,7 @@ Convert = Callable[[Array], Array]
 _GAP_PERIODS, _MIN_GAP = 3.0, 0.3  # periods, s: a pause longer than both is a gap
 _MAX_LISTED = 100  # maximum number of listed gaps
 _MAX_IMPLAUSIBLE = 0.1  # maximum fraction of implausible samples, which are left out; more indicate a wrong unit
+_NEIGHBORS, _LONELY = 5, 10.0  # samples, s: distance of a time from the median about it, beyond which it is damaged
 _JUMP = 20.0  # usual changes between samples, beyond which a sample that its neighbors do not share is an outlier
 _AROUND = 7  # samples, width of the median that an outlier is compared with
 _NOT_SPIKY = ("position", "velocity_world", "velocity", "rates", "dvl", "depth", "altitude", "attitude", "fix")
@@ -68,8 +69,12 @@ def clean(source: Source, times: Callable[[Array, Array], Array], convert: Conve
     quantity = QUANTITIES[source.quantity]
     topic = Topic(source.quantity, source.name, folder / f"{source.quantity}.topic", 0, broken=source.broken)
     stamps, keys, usual = _survey(source, times)
-    index = drop_duplicates(stamps, keys)
-    topic.duplicates = len(stamps) - len(index)
+    odd = np.abs(stamps - median_filter(stamps, _NEIGHBORS, mode="nearest")) > _LONELY
+    odd &= odd.mean() < _MAX_IMPLAUSIBLE  # else the rows are out of order
+    topic.broken += int(np.count_nonzero(odd))
+    known = np.flatnonzero(~odd)
+    index = known[drop_duplicates(stamps[known], keys[known])]
+    topic.duplicates = len(known) - len(index)
     order, at, topic.burst = put_in_order(stamps[index])
     topic.sorted = int(np.count_nonzero(np.diff(stamps[index]) < 0.0)) if not topic.burst else 0
     index = index[order]

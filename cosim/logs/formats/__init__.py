@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.logs.bag_storage import SUFFIXES
-from cosim.logs.chunked_file import OnProgress
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.formats import bag, dataflash, table, tlog, ulog
+from cosim.logs.records import OnProgress
 from cosim.logs.spool import LogContents
 
 __all__ = ["FORMATS", "LogFormat"]

@@ -13,14 +13,15 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import ImportLogError
-from cosim.logs.bag_storage import DAMAGE, MAX_DECODED, StoredMessage, bag_files, stored_messages
+from cosim.logs.bag_records import StoredMessage
+from cosim.logs.bag_storage import MAX_DECODED, bag_files, stored_messages
 from cosim.logs.blueos import find_vehicle, read_recording
-from cosim.logs.chunked_file import OnProgress
 from cosim.logs.cleaning.clocks import Clock
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.draft_map import missing_map
 from cosim.logs.frames import UNITS
 from cosim.logs.message_definitions import parse_definition, reachable_types
+from cosim.logs.records import DAMAGE, OnProgress
 from cosim.logs.spool import LogContents
 from plant_fmu.toml_tables import hint
 
@@ -54,7 +55,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progre
         if message.topic not in readers:
             contents.unread[message.topic] += 1
             continue
-        write_time = clock.time(message.time)
+        write_time = clock.time(message.time, message.topic)
         try:
             decoded = decoder.decode(message)
         except _undecodable():

@@ -5,24 +5,24 @@ from __future__ import annotations
 import contextlib
 import io
 import math
+import re
 import struct
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from pymavlink.DFReader import DFFormat
 
 from cosim.errors import ImportLogError
-from cosim.logs.chunked_file import ChunkedFile, OnProgress
 from cosim.logs.cleaning.clocks import Clock
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.frames import ReadComponents, attitude_of_angles, attitude_of_quaternion, scale_fields
+from cosim.logs.records import OnProgress, Records
 from cosim.logs.spool import LogContents, handled_names
 from cosim.logs.vehicle_messages import DOWNWARD
 
 _HEAD = b"\xa3\x95"  # first bytes of each message
 _FMT, _FMT_SIZE = 0x80, 89  # type of the message FMT; its size [bytes]
-_MAX_MESSAGE = 512  # bytes
+_NAMES = re.compile(r"[A-Za-z0-9_, ]+")  # of a message and its fields
 _MIN_MARKS = 10  # first bytes of messages in a log of which no message can be read
 _FRAMES = (  # names of ArduSub's FRAME_CONFIG, from 0
     "bluerov1", "vectored", "vectored_6dof", "vectored_6dof_90deg", "simplerov_3", "simplerov_4", "simplerov_5",
@@ -46,15 +46,11 @@ Fields = dict[str, Any]
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progress: OnProgress) -> None:
     """Read a dataflash log, as specified by `LogFormat`; raise ImportLogError for another file."""
     contents.autopilot = "ardupilot"
-    messages = _Messages(contents)
-    lost, any_message = 0, False
-    for name, fields in parse_messages(path, _READ, on_progress):
-        if name is None:
-            lost += 1
-            continue
+    samples, messages, any_message = _Samples(contents), Messages(path, _READ, on_progress), False
+    for name, fields in messages:
         any_message = True
         if fields is not None:
-            messages.add(name, fields)
+            samples.add(name, fields)
         elif name not in _ABOUT_LOG:
             contents.unread[name] += 1
     if not any_message:
@@ -63,9 +59,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progre
         if marks > _MIN_MARKS:
             raise ImportLogError("has no message FMT, which defines the others: the beginning of the log is missing")
         raise ImportLogError("holds no message, expected a dataflash log of ArduPilot")
-    if lost:
-        contents.remarks.append(f"{lost} bytes of the log are no messages and were passed over.")
-    contents.remarks += messages.clock.remarks("The autopilot's clock")
+    contents.remarks += [*messages.remarks(path.name), *samples.clock.remarks("The autopilot's clock")]
     contents.preferences |= {
         "attitude": ("XKQ[0]", "ATT"),
         "depth": _preferred_barometers(contents),
@@ -84,7 +78,7 @@ def _preferred_barometers(contents: LogContents) -> tuple[str, ...]:
     return tuple(sorted(instances, key=lambda name: name != primary))
 
 
-class _Messages:
+class _Samples:
     """Add messages to the contents of a log; ``_read_x`` converts messages X by hand."""
 
     def __init__(self, contents: LogContents) -> None:
@@ -142,36 +136,36 @@ class _Messages:
         return stamp == last or self.clock.is_behind(stamp)
 
 
-_READ = frozenset(_SAMPLES) | handled_names(_Messages)
+_READ = frozenset(_SAMPLES) | handled_names(_Samples)
 
 
-def parse_messages(
-    path: Path, names: frozenset[str], on_progress: OnProgress
-) -> Iterator[tuple[str | None, Fields | None]]:
-    """Yield name and fields of each message, None for fields of other names; None and None for an invalid byte."""
-    formats: dict[int, tuple[DFFormat, struct.Struct]] = {}
-    first = DFFormat(_FMT, "FMT", _FMT_SIZE, "BBnNZ", "Type,Length,Name,Format,Columns")
-    formats[_FMT] = first, struct.Struct(first.msg_struct)
-    with contextlib.closing(ChunkedFile(path, on_progress)) as file:
-        while (ahead := file.ahead(_MAX_MESSAGE)) >= 3:
-            data, offset = file.data, file.offset
-            form, unpack = formats.get(data[offset + 2], (None, None))
-            if form is None or unpack is None or data[offset : offset + 2] != _HEAD or form.len > ahead:
-                yield None, None
-                file.offset += 1
-                continue
-            file.offset += form.len
-            is_read = form.name in names
-            values = unpack.unpack(data[offset + 3 : file.offset]) if is_read or form.name == "FMT" else ()
-            if form.name == "FMT":
-                try:
-                    _learn(values, formats)
-                except ImportLogError:
-                    if len(formats) == 1:
-                        raise
-                    yield None, None  # damage: others are known
-                    continue
-            yield form.name, _fields(form, values) if is_read else None
+class Messages(Records[tuple[str, Fields | None]]):
+    """Name and fields of each message, None for fields of messages that are not among `names`."""
+
+    mark = re.compile(re.escape(_HEAD))
+    checked = re.compile(re.escape(_HEAD + bytes([_FMT])))  # of which sizes and names must agree
+    head = 3
+
+    def __init__(self, path: Path, names: frozenset[str], on_progress: OnProgress = lambda fraction: None) -> None:
+        super().__init__(path, on_progress)
+        self._names = names
+        first = DFFormat(_FMT, "FMT", _FMT_SIZE, "BBnNZ", "Type,Length,Name,Format,Columns")
+        self._formats: dict[int, tuple[DFFormat, struct.Struct]] = {_FMT: (first, struct.Struct(first.msg_struct))}
+
+    def _size_at(self, data: bytes, offset: int) -> int:
+        form, _ = self._formats.get(data[offset + 2], (None, None))
+        return form.len if form is not None and data.startswith(_HEAD, offset) else 0
+
+    def _parse(self, record: bytes) -> tuple[str, Fields | None]:
+        form, unpack = self._formats[record[2]]
+        if form.name == "FMT":
+            try:
+                _learn(unpack.unpack_from(record, 3), self._formats)
+            except ImportLogError as error:
+                if len(self._formats) == 1:
+                    raise
+                raise ValueError from error  # damage: others are known
+        return form.name, _fields(form, unpack.unpack_from(record, 3)) if form.name in self._names else None
 
 
 def _learn(fields: tuple[Any, ...], formats: dict[int, tuple[DFFormat, struct.Struct]]) -> None:
@@ -183,6 +177,8 @@ def _learn(fields: tuple[Any, ...], formats: dict[int, tuple[DFFormat, struct.St
         unpack = struct.Struct(form.msg_struct)
     except Exception as error:
         raise ImportLogError(f"message {name!r} has the format {letters!r}, which is unknown") from error
+    if not _NAMES.fullmatch(f"{name},{columns}"):
+        raise ImportLogError(f"message {name!r} has fields {columns!r}, expected names")
     if unpack.size != size - 3 or len(form.columns) != len(letters):
         raise ImportLogError(f"message {name!r} has {size} bytes, expected {unpack.size + 3} by its format {letters!r}")
     formats[kind] = form, unpack

@@ -18,11 +18,11 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 
 from cosim.errors import ImportLogError
-from cosim.logs.chunked_file import OnProgress
 from cosim.logs.cleaning.clocks import Clock
 from cosim.logs.column_map import ColumnMap, TimeColumn
 from cosim.logs.draft_map import missing_map
 from cosim.logs.frames import UNITS
+from cosim.logs.records import OnProgress
 from cosim.logs.spool import LogContents
 from cosim.simulation.signals import Array
 from plant_fmu.toml_tables import hint

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.logs.chunked_file import OnProgress
 from cosim.logs.column_map import ColumnMap
+from cosim.logs.formats.ulog_messages import ULogMessages
+from cosim.logs.records import OnProgress
 from cosim.logs.spool import LogContents
-from cosim.logs.ulog_messages import ULogMessages
 from cosim.logs.vehicle_messages import DOWNWARD, vehicle_kind
 
 
@@ -34,10 +34,10 @@ _TOPICS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progress: OnProgress) -> None:
     """Read a log of PX4, as specified by `LogFormat`; raise ImportLogError for another file."""
-    log = ULogMessages(path, frozenset(_TOPICS))
+    log = ULogMessages(path, frozenset(_TOPICS), on_progress)
     outputs: dict[tuple[str, str], list[str]] = {}
     names = set()
-    for name, samples in log.blocks(on_progress):
+    for name, samples in log.blocks():
         names.add(name.split("[")[0])
         _put_samples(samples, contents, name, outputs)
     contents.autopilot = "px4"
@@ -49,8 +49,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progre
         contents.remarks.append(
             f"The logger lost data {len(log.dropouts)} times, {sum(log.dropouts):.3g} s in total, by its own count."
         )
-    if log.is_damaged:
-        contents.remarks.append("The file is damaged; what could be read of it is here.")
+    contents.remarks += log.remarks(path.name)
     contents.preferences |= {"rates": ("vehicle_angular_velocity[0]", "vehicle_attitude[0]")}
 
 

@@ -110,7 +110,7 @@ def test_a_damaged_chunk_is_a_gap(tmp_path, imported):
     data[len(data) // 2 : len(data) // 2 + 8] = bytes(8)
     path.write_bytes(data)
     run = imported(path)
-    assert has_remark(run, "1 damaged chunks of dive.mcap were passed over.")
+    assert has_remark(run, "bytes of dive.mcap are damaged and were passed over.")
     assert facts_by_quantity(run)["attitude"].gaps == before + 1
 
 

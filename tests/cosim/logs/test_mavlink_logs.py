@@ -14,7 +14,7 @@ from scipy import signal
 import cosim
 from cosim.errors import CosimError, ImportLogError
 from cosim.io.strict_json import json_text
-from cosim.logs.formats.dataflash import _Messages, parse_messages
+from cosim.logs.formats.dataflash import Messages, _Samples
 from cosim.logs.selection import select_topics
 from cosim.logs.vehicle_messages import VehicleMessages
 from cosim.results.log_facts import load_log_facts
@@ -206,7 +206,7 @@ def test_stamps_of_1970_are_read_with_a_remark(tmp_path, imported):
     (tmp_path / "it.tlog").write_bytes(frames_of(lambda k: (START if k > 100 else 0) + 100_000 * k, 40.0))
     run = imported(tmp_path / "it.tlog")
     assert has_remark(run, "jumps by +1.7e+09 s: it is taken as a pause of 1 s")
-    assert facts_by_quantity(run)["attitude"].samples == 400
+    assert facts_by_quantity(run)["attitude"].samples == 398
 
 
 def test_damaged_dataflash_log_gives_what_is_before_and_after(tmp_path, imported, six_thrusters):
@@ -217,7 +217,7 @@ def test_damaged_dataflash_log_gives_what_is_before_and_after(tmp_path, imported
     content[middle + 3000 : middle + 3000] = b"\xa3\x95\x80" + rng.bytes(86)  # a format that is none
     (tmp_path / "it.bin").write_bytes(content)
     run = imported(tmp_path / "it.bin", six_thrusters)
-    assert has_remark(run, "bytes of the log are no messages and were passed over")
+    assert has_remark(run, "bytes of it.bin are damaged and were passed over")
     assert 0.9 * first < facts_by_quantity(run)["attitude"].samples < first
 
 
@@ -266,14 +266,14 @@ def test_junk_in_a_log_loses_only_overwritten_frames(tmp_path, imported):
     (tmp_path / "it.tlog").write_bytes(data)
     run = imported(tmp_path / "it.tlog")
     assert facts_by_quantity(run)["attitude"].samples > 5150  # of 5245
-    assert has_remark(run, "bytes of the log are no MAVLink frames")
+    assert has_remark(run, "bytes of it.tlog are damaged")
 
 
 def test_dataflash_parser_matches_pymavlink():
     """Every message that the readers take comes to the same numbers."""
     wanted = frozenset({"ATT", "XKF1", "IMU", "PARM", "BAT", "RCOU", "BARO"})
     log = DFReader.DFReader_binary(str(DATAFLASH))
-    for name, fields in parse_messages(DATAFLASH, wanted, lambda fraction: None):
+    for name, fields in Messages(DATAFLASH, wanted):
         if fields is None:
             continue
         theirs = log.recv_match(type=list(wanted))
@@ -292,7 +292,7 @@ USED = {  # message: fields that are read
     "VISO": "TimeUS dt PosDX PosDY PosDZ",
     "PARM": "TimeUS Value", "RCOU": "TimeUS " + " ".join(f"C{i}" for i in range(1, 15)),
 }  # fmt: skip
-FORMATS = {m["Name"]: m for _, m in parse_messages(DATAFLASH, frozenset({"FMT"}), lambda fraction: None) if m}
+FORMATS = {m["Name"]: m for _, m in Messages(DATAFLASH, frozenset({"FMT"})) if m}
 
 
 def message_of(name, letters, *values):
@@ -332,7 +332,7 @@ def test_parameters_that_are_not_finite_are_omitted(tmp_path, imported, six_thru
 
 def test_rates_of_a_controller_that_rests_are_no_samples(contents):
     """In MANUAL an ArduSub writes RATE on and on with the stamp of its last control step; other clocks go on."""
-    handlers = _Messages(contents)
+    handlers = _Samples(contents)
     for k in range(100):
         at = 10_000_000 + 40_000 * k
         handlers.add("ATT", {"TimeUS": at, "Roll": 1.0, "Pitch": 0.0, "Yaw": 0.0})
@@ -359,7 +359,7 @@ def test_rates_of_a_controller_that_rests_are_no_samples(contents):
     ],
 )  # fmt: skip
 def test_dataflash_messages_are_samples_in_si_units(contents, name, fields, samples):
-    _Messages(contents).add(name, {"TimeUS": 10_000_000} | fields)
+    _Samples(contents).add(name, {"TimeUS": 10_000_000} | fields)
     assert contents.sources.keys() == samples.keys()
     for source, values in samples.items():
         assert [row[2:].tolist() for block in contents.sources[source].blocks() for row in block] == [values][
@@ -393,7 +393,7 @@ def test_rates_are_stamped_where_the_gyro_filter_had_them(contents, tmp_path, au
 def test_visual_odometry_is_the_mean_velocity_of_its_interval(contents):
     """Fields as ArduPilot's structure VISO has them; the interval ends at the stamp."""
     fields = {"dt": 0.2, "PosDX": 0.1, "PosDY": -0.02, "PosDZ": 0.0, "conf": 90.0, "AngDX": 0.0, "AngDY": 0.0}
-    _Messages(contents).add("VISO", {"TimeUS": 2e6, "AngDZ": 0.1} | fields)
+    _Samples(contents).add("VISO", {"TimeUS": 2e6, "AngDZ": 0.1} | fields)
     message = mavlink.MAVLink_vision_position_delta_message(2_000_000, 200_000, [0.0] * 3, [0.1, -0.02, 0.0], 90.0)
     VehicleMessages(contents, 1, 3, 12).add(255, 197, message, 2.0)
     for name in ("VISO", "VISION_POSITION_DELTA"):

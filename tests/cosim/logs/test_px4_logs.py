@@ -8,8 +8,9 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from cosim.logs import chunked_file, ulog_messages
-from cosim.logs.ulog_messages import ULogMessages
+from cosim.logs import records
+from cosim.logs.formats import ulog_messages
+from cosim.logs.formats.ulog_messages import ULogMessages
 from cosim.results.log_facts import load_log_facts
 from tests.cosim.logs.dive import Dive, assert_flown
 
@@ -83,7 +84,7 @@ def read_samples(path):
     """The reader, and all samples of the file's topics."""
     ours = {}
     log = ULogMessages(path, TOPICS)
-    for name, block in log.blocks(lambda fraction: None):
+    for name, block in log.blocks():
         ours.setdefault(name, []).append(block)
     return log, {name: np.concatenate(blocks) for name, blocks in ours.items()}
 
@@ -107,7 +108,7 @@ def test_samples_are_those_of_pyulog(dive, path):
     log, ours, theirs = samples_of(path)
     assert_equal_samples(ours, theirs)
     assert log.parameters == {"MAV_TYPE": 12.0} == theirs.initial_parameters
-    assert not log.is_damaged and ours["battery_status[0]"]["cells[1].raw[1]"][-1] == len(dive.times) - 1
+    assert not log.lost and ours["battery_status[0]"]["cells[1].raw[1]"][-1] == len(dive.times) - 1
 
 
 def test_data_appended_after_a_crash_are_read(path):
@@ -121,7 +122,7 @@ def test_data_appended_after_a_crash_are_read(path):
     path.write_bytes(data)
     log, ours, _ = samples_of(path)
     assert_equal_samples(ours, theirs)
-    assert not log.is_damaged
+    assert log.lost == 23
 
 
 def test_reading_goes_on_behind_damage(path):
@@ -130,7 +131,7 @@ def test_reading_goes_on_behind_damage(path):
     data[at : at + 300] = bytes(300)
     path.write_bytes(data)
     log, ours, theirs = samples_of(path)
-    assert log.is_damaged and theirs.file_corruption
+    assert log.lost and theirs.file_corruption
     for data in theirs.data_list:
         found = ours[f"{data.name}[{data.multi_id}]"]
         assert found["timestamp"][-1] == data.data["timestamp"][-1]
@@ -140,9 +141,9 @@ def test_reading_goes_on_behind_damage(path):
 @pytest.mark.parametrize("junk", [bytes(300_000), np.random.default_rng(3).bytes(300_000)], ids=["zeros", "random"])
 def test_junk_behind_a_log_leaves_what_came_before(path, junk):
     _, _, theirs = samples_of(path)
-    path.write_bytes(path.read_bytes() + junk)
+    path.write_bytes(path.read_bytes() + message("O", b"\1\0") + junk)
     log, ours = read_samples(path)
-    assert log.is_damaged
+    assert log.lost
     assert_equal_samples(ours, theirs)
 
 
@@ -154,13 +155,13 @@ def test_nested_formats_are_bounded(tmp_path):
         subscription = message("A", b"\0\0\0vehicle_attitude")
         (tmp_path / "deep.ulg").write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8) + b"".join(formats) + subscription)
         log = ULogMessages(tmp_path / "deep.ulg", frozenset(["vehicle_attitude"]))
-        assert not list(log.blocks(lambda fraction: None)) and log.is_damaged
+        assert not list(log.blocks()) and log.lost
 
 
 @pytest.mark.medium
 def test_memory_does_not_grow_with_the_log(path, monkeypatch):
     """Samples are given in blocks: a log of four times the length needs the same memory."""
-    monkeypatch.setattr(chunked_file, "_CHUNK", 1 << 15)
+    monkeypatch.setattr(records, "_WINDOW", 1 << 15)
     monkeypatch.setattr(ulog_messages, "_BLOCK", 1 << 10)
     whole = path.read_bytes()
     section = whole[whole.index(struct.pack("<HB", 8, ord("S")) + SYNC) :]
@@ -168,7 +169,7 @@ def test_memory_does_not_grow_with_the_log(path, monkeypatch):
     def peak(times):
         path.write_bytes(whole + times * section)
         tracemalloc.start()
-        for _ in ULogMessages(path, TOPICS).blocks(lambda fraction: None):
+        for _ in ULogMessages(path, TOPICS).blocks():
             pass
         found = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()

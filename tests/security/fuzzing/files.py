@@ -242,12 +242,12 @@ def parquet_of_a_log(seeds: Seeds) -> Case:
     return _log(seeds, "it.parquet", made.getvalue(), columns=MAP)
 
 
-@reader("telemetry log", "bytes", "cosim.logs.formats.tlog:_frames", "cosim.mavlink.wire.framing:parse_header")
+@reader("telemetry log", "bytes", "cosim.logs.formats.tlog:_Frames._parse", "cosim.mavlink.wire.framing:parse_header")
 def telemetry_log(seeds: Seeds) -> Case:
     return _log(seeds, "it.tlog", (LOGS / "small.tlog").read_bytes()[:40_000])
 
 
-@reader("dataflash log", "bytes", "cosim.logs.formats.dataflash:parse_messages", "cosim.logs.formats.dataflash:_learn")
+@reader("dataflash log", "bytes", "cosim.logs.formats.dataflash:Messages._parse", "cosim.logs.formats.dataflash:_learn")
 def dataflash_log(seeds: Seeds) -> Case:
     data = (LOGS / "small.BIN").read_bytes()[:60_000]  # of a vehicle with six thrusters, which it now does not say
     return _log(seeds, "it.bin", data.replace(b"FRAME_CONFIG", b"FRAME_CONFIX").replace(b"SERVO", b"SERVX"))
@@ -256,9 +256,9 @@ def dataflash_log(seeds: Seeds) -> Case:
 @reader(
     "log of PX4",
     "bytes",
-    "cosim.logs.ulog_messages:ULogMessages._messages",
-    "cosim.logs.ulog_messages:ULogMessages._process",
-    "cosim.logs.ulog_messages:_Topic.samples",
+    "cosim.logs.records:Records._read",
+    "cosim.logs.formats.ulog_messages:ULogMessages._parse",
+    "cosim.logs.formats.ulog_messages:_Topic.samples",
 )
 def ulog(seeds: Seeds) -> Case:
     from tests.cosim.logs.test_px4_logs import Dive, write_ulog
@@ -268,7 +268,7 @@ def ulog(seeds: Seeds) -> Case:
     return _log(seeds, "it.ulg", path.read_bytes())
 
 
-@reader("recording of BlueOS", "bytes", "cosim.logs.blueos:_parts", "cosim.logs.bag_storage:_mcap_records")
+@reader("recording of BlueOS", "bytes", "cosim.logs.blueos:_parts", "cosim.logs.bag_records:McapRecords._parse")
 def recording(seeds: Seeds) -> Case:
     from tests.cosim.logs.test_blueos import write_recording
 
@@ -293,5 +293,8 @@ def _bag(suffix: str, seeds: Seeds) -> Case:
     return _log(seeds, path.name, path.read_bytes(), columns=test_bags.MAP.encode())
 
 
-for _suffix, _parser in (("mcap", "_mcap_messages"), ("db3", "_sqlite_messages"), ("bag", "_ros1_messages")):
-    reader(f"bag in {_suffix}", "bytes", f"cosim.logs.bag_storage:{_parser}", _DEFINITIONS)(partial(_bag, _suffix))
+for _suffix, _parser in (
+    ("mcap", "bag_records:McapRecords._parse"), ("db3", "bag_database:sqlite_messages"),
+    ("bag", "bag_records:RosbagRecords._parse"),
+):  # fmt: skip
+    reader(f"bag in {_suffix}", "bytes", f"cosim.logs.{_parser}", _DEFINITIONS)(partial(_bag, _suffix))

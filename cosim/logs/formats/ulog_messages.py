@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
 import struct
 from collections.abc import Iterator
@@ -15,22 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.errors import ImportLogError
-from cosim.logs.chunked_file import ChunkedFile, OnProgress
+from cosim.logs.records import OnProgress, Records
 
 _MAGIC = b"ULog\x01\x12\x35"
-_SYNC = bytes.fromhex("2f731320250cbb12")  # body of a synchronization message
 _HEAD = struct.Struct("<HB")  # size and type of a message
 _FILE_HEAD = 16  # bytes, size of the file's header
 _BLOCK = 1 << 16  # bytes, minimum size of a yielded block of samples before the end
 _MAX_MESSAGE = 10_000  # bytes, maximum size of a message; a longer one counts as damage
 _MAX_LENGTH, _MAX_DEPTH = 4096, 8  # maximum length of an array in a message; maximum depth of nested types
 _KNOWN = frozenset(b"BFIMPQARDLCSO")  # types of messages
+_SIZES = {"B": 40, "O": 2, "R": 3, "S": 8}  # bytes, sizes of messages that have only one
 _TYPES = {
     "int8_t": "i1", "uint8_t": "u1", "int16_t": "<i2", "uint16_t": "<u2", "int32_t": "<i4", "uint32_t": "<u4",
     "int64_t": "<i8", "uint64_t": "<u8", "float": "<f4", "double": "<f8", "bool": "i1", "char": "i1",
 }  # fmt: skip
-_POSSIBLE = re.compile(rb"[\x00-\xff][\x00-\x27][" + bytes(sorted(_KNOWN)) + rb"]", re.DOTALL)  # heads of messages
-_FAULTS = (ValueError, KeyError, IndexError, struct.error, UnicodeDecodeError)
 
 
 @dataclass
@@ -49,43 +46,49 @@ class _Topic:
         return samples
 
 
-class ULogMessages:
-    """Read a ULog file from start to end."""
+class ULogMessages(Records["_Topic | None"]):
+    """Read a ULog file from start to end; a record is a message, and gives its topic if that is read."""
 
-    def __init__(self, path: Path, names: frozenset[str]) -> None:
-        self._path, self._names = path, names
+    head = _HEAD.size
+    mark = re.compile(rb"[\0-\xff][\0-\x27][" + bytes(sorted(_KNOWN)) + rb"]")
+
+    def __init__(self, path: Path, names: frozenset[str], on_progress: OnProgress = lambda fraction: None) -> None:
+        super().__init__(path, on_progress, _FILE_HEAD)
+        with path.open("rb") as file:
+            if file.read(len(_MAGIC)) != _MAGIC:
+                raise ImportLogError("cannot be read as a ULog file: it does not begin as one")
+        self._names = names
         self.parameters: dict[str, float] = {}
         self.dropouts: list[float] = []  # durations in which the logger lost data [s]
-        self.is_damaged = False
         self._formats: dict[str, list[tuple[str, int, str]]] = {}
         self._dtypes: dict[str, tuple[np.dtype[Any], int]] = {}
         self._topics: dict[int, _Topic | None] = {}  # topics by their id in the file; None: not read
         self._has_begun = False
-        self._appended: list[int] = []  # bytes, offsets in the file at which data were appended after a crash
 
     @property
     def formats(self) -> set[str]:
         """Types of messages that the file defines."""
         return set(self._formats)
 
-    def blocks(self, on_progress: OnProgress) -> Iterator[tuple[str, NDArray[Any]]]:
+    def blocks(self) -> Iterator[tuple[str, NDArray[Any]]]:
         """Yield blocks of samples: the topic with its instance, and a structured array in the order of the file."""
-        for kind, body in self._messages(on_progress):
-            try:
-                topic = self._process(kind, body)
-            except _FAULTS:
-                self.is_damaged = True
-                continue
+        for topic in self:
             if topic is not None and len(topic.pending) >= _BLOCK:
                 yield topic.name, topic.samples()
         for topic in self._topics.values():
             if topic is not None and topic.pending:
                 yield topic.name, topic.samples()
 
-    def _process(self, kind: int, body: bytes) -> _Topic | None:
-        """Process a message; return its topic if it is a sample of a topic that is read."""
+    def _size_at(self, data: bytes, offset: int) -> int:
+        size, kind = _HEAD.unpack_from(data, offset)
+        return _HEAD.size + size if kind in _KNOWN and 0 < size <= _MAX_MESSAGE else 0
+
+    def _parse(self, record: bytes) -> _Topic | None:
+        kind, body = chr(record[2]), record[_HEAD.size :]
+        if len(body) != _SIZES.get(kind, len(body)):
+            raise ValueError
         is_first, self._has_begun = not self._has_begun, True
-        match chr(kind):
+        match kind:
             case "D":
                 number = int.from_bytes(body[:2], "little")
                 topic = self._topics[number]  # KeyError: damage
@@ -113,7 +116,6 @@ class ULogMessages:
             case "B" if is_first:
                 if body[8] & ~1 or any(body[9:16]):
                     raise ImportLogError("cannot be read as a ULog file: it has flags of a newer format")
-                self._appended = [x for x in struct.unpack_from("<3Q", body, 16) if x]
         return None
 
     def _topic(self, name: str, kind: str) -> _Topic:
@@ -141,34 +143,6 @@ class ULogMessages:
                     yield f"{prefix}{name}{index}", _TYPES[element]
                 else:
                     yield from self._flat(f"{prefix}{name}{index}.", element, depth + 1)
-
-    def _messages(self, on_progress: OnProgress) -> Iterator[tuple[int, bytes]]:
-        """Yield type and body of each message; after invalid bytes, go on at a sync mark or a likely head."""
-        with contextlib.closing(ChunkedFile(self._path, on_progress)) as file:
-            if file.ahead(_FILE_HEAD) < len(_MAGIC) or not file.data.startswith(_MAGIC):
-                raise ImportLogError("cannot be read as a ULog file: it does not begin as one")
-            file.offset = min(_FILE_HEAD, len(file.data))
-            searched = 0  # offset in the file before which no mark follows the present message
-            while (ahead := file.ahead(_MAX_MESSAGE + _HEAD.size)) >= _HEAD.size:
-                data, offset = file.data, file.offset
-                size, kind = _HEAD.unpack_from(data, offset)
-                end = offset + _HEAD.size + size
-                if kind not in _KNOWN or not 0 < size <= _MAX_MESSAGE:
-                    self.is_damaged = True
-                    mark = data.find(_SYNC, max(offset + 1, searched - file.start))
-                    if mark >= 0:
-                        file.offset = mark + len(_SYNC)
-                    else:
-                        searched = file.start + max(0, len(data) - len(_SYNC) + 1)
-                        head = _POSSIBLE.search(data, offset + 1)
-                        file.offset = head.start() if head else max(offset + 1, len(data) - _HEAD.size + 1)
-                elif self._appended and file.start + end > self._appended[0] >= file.start + offset:
-                    file.offset = min(self._appended.pop(0) - file.start, len(data))  # a crash has cut this message
-                elif _HEAD.size + size > ahead:
-                    return
-                else:
-                    file.offset = end
-                    yield kind, data[offset + _HEAD.size : end]
 
 
 def _field(text: str) -> tuple[str, int, str]:
