@@ -52,7 +52,7 @@ def shared_nuisances(fit: Fit) -> Iterator[str]:
     shared = [f"{p.name} {x:.3g} ± {half:.2g} {p.unit}".rstrip() for p, x, half in numbers
               if p.is_nuisance and p.run is None and p.kind != "phase"]  # fmt: skip
     if shared:
-        yield f"Estimated beside, and no part of this file: {'; '.join(shared)}."
+        yield f"Also estimated, but not in this file: {'; '.join(shared)}."
 
 
 def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
@@ -75,7 +75,7 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
     if fit.forces is not None:
         sizes = ", ".join(f"{x:.2g}" for x in np.sqrt(np.mean(np.square(fit.forces), axis=0)))
         yield (
-            f"A force that changes in time was estimated beside, constant within windows of {STAGES[0]:g} s: {sizes} N "
+            f"A force that changes in time was also estimated, constant within windows of {STAGES[0]:g} s: {sizes} N "
             "north, east and down (root mean square). Its mean over the runs looks like weight less buoyancy or a "
             "current; longer runs make that smaller."
         )

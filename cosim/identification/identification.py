@@ -79,8 +79,8 @@ def identify(
     else:
         predictions = validate(logs, vehicle, parameters, fitted.values, fitted.step)
     flags = {
-        "": runs, "--vehicle": [start], "--held-out": held_out, "--free": free or (), "--nuisance": nuisance,
-        "--measured-attitude": [""] if turns_measured and structure is None else (),
+        "": runs, "--vehicle": [start], "--held-out": held_out, "--free": free or (),
+        "--nuisance": nuisance or [""], "--measured-attitude": [""] if turns_measured and structure is None else (),
     }  # fmt: skip
     words = (word for name, values in flags.items() if values for word in (name, *map(str, values)) if word)
     command = f"cosim identify {shlex.join(words)}"

@@ -120,10 +120,8 @@ class Records(Generic[Record]):
     def _next(self, position: int) -> int:
         """Return the position of the next bytes that look like the begin of a record, or the end of the file."""
         while position < self.end:
-            offset = self._load(position, _WINDOW // 2)
+            offset = self._load(position, self.head + 1)
             if (match := self.mark.search(self._data, offset)) is not None:
                 return min(self._start + match.start(), self.end)
-            if self._start + len(self._data) >= self.end:
-                break
-            position = self._start + max(offset + 1, len(self._data) - self.head)
+            position = max(position + 1, self._start + len(self._data) - self.head)
         return self.end

@@ -246,9 +246,14 @@ def _complete_batches(file: Path, stream: Any, warn: bool) -> Iterator[pa.Record
 
 
 @contextlib.contextmanager
-def stream_batches(file: Path, warn: bool = False) -> Iterator[tuple[pa.Schema, Iterator[pa.RecordBatch]]]:
-    """Open an Arrow stream to read its schema and complete batches, whose memory is the file's."""
-    with pa.memory_map(str(file)) as memory, pa.ipc.open_stream(memory) as stream:
+def stream_batches(
+    file: Path, warn: bool = False, is_mapped: bool = True
+) -> Iterator[tuple[pa.Schema, Iterator[pa.RecordBatch]]]:
+    """Open an Arrow stream to read its schema and complete batches, whose memory is the file's if it is mapped."""
+    with (
+        pa.memory_map(str(file)) if is_mapped else pa.OSFile(str(file)) as memory,
+        pa.ipc.open_stream(memory) as stream,
+    ):
         yield stream.schema, _complete_batches(file, stream, warn)
 
 

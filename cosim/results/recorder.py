@@ -99,7 +99,7 @@ class Recorder:
         size = max(1, min(max(_BATCH, self.rows // _GROUPS), _GROUP_VALUES // len(self._schema)))
         # written by name: the writer's destructor would fail on a closed `file`
         with (
-            stream_batches(self._folder / STREAM) as (_, batches),
+            stream_batches(self._folder / STREAM, is_mapped=False) as (_, batches),  # else all of it stays in memory
             atomic_file(self._folder / RECORD) as file,
             pq.ParquetWriter(file.name, self._schema, **_WRITING) as writer,
         ):

@@ -41,7 +41,10 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progre
         if recorded:
             read_recording(path, *recorded, contents, on_progress)
             return
-        raise missing_map(_fields(path))
+        fields = _fields(path)
+        if not fields:
+            raise ImportLogError("holds no message, expected a bag with messages")
+        raise missing_map(fields)
     without_topic = next((name for name, mapped in columns.quantities.items() if not mapped.topic), None)
     if without_topic is not None:
         raise ImportLogError(f"the map says no topic for [{without_topic}], expected topic and columns")

@@ -27,7 +27,8 @@ _MIN_MARKS = 10  # first bytes of messages in a log of which no message can be r
 _FRAMES = (  # names of ArduSub's FRAME_CONFIG, from 0
     "bluerov1", "vectored", "vectored_6dof", "vectored_6dof_90deg", "simplerov_3", "simplerov_4", "simplerov_5",
 )  # fmt: skip
-_OTHERS = ("ArduCopter", "ArduPlane", "ArduRover", "AntennaTracker", "Blimp")  # firmware of other vehicles
+# firmware of other vehicles, as it has named itself since 2018 and before
+_OTHERS = re.compile(r"(?:Ardu|APM:)(Copter|Plane|Rover)|(AntennaTracker|Blimp)")
 _ABOUT_LOG = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "VER"}  # messages that are not counted as unread
 _SAMPLES: dict[str, tuple[tuple[str, ReadComponents], ...]] = {  # message: quantities in SI units, by its fields
     "ATT": (("attitude", attitude_of_angles("Roll Pitch Yaw", math.pi / 180.0)),),
@@ -96,7 +97,7 @@ class _Samples:
             raise ImportLogError(f"message {name} has a text, expected numbers as ArduPilot has them") from error
 
     def _add(self, name: str, m: Fields) -> None:
-        stamp = m.get("TimeUS", math.nan) * 1e-6
+        stamp = m["TimeUS"] * 1e-6 if "TimeUS" in m else m.get("TimeMS", math.nan) * 1e-3  # before 2015
         if name == "RATE" and self._is_stale(stamp):
             return
         time = self.clock.time(stamp)
@@ -118,8 +119,8 @@ class _Samples:
             self._contents.frame = _FRAMES[int(m["Value"])]
 
     def _read_msg(self, m: Fields, source: str, time: float) -> None:
-        if (firmware := str(m["Message"]).split(" ")[0]) in _OTHERS:
-            self._contents.kind = f"vehicle of {firmware}"
+        if firmware := _OTHERS.match(str(m["Message"])):
+            self._contents.kind = f"vehicle of {firmware[0]}"
 
     def _read_viso(self, m: Fields, source: str, time: float) -> None:
         if m["dt"] > 0.0:  # the mean over dt, which ends at the stamp

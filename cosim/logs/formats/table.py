@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import contextlib
 import csv
-import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -34,7 +33,7 @@ _MARKS = {codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16", codecs.B
 _FLAGS = {"true": "1", "false": "0"}
 _NUMBER = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 _DATE = r"^\s*\d{4}-\d\d-\d\d"
-_DECIMAL_COMMA = re.compile(r"\s*[-+]?\d+,\d+\s*")
+_MAX_LINE = 1 << 24  # characters
 _MAX_TEXTS = 0.5  # maximum fraction of a column's cells that are texts, and left out
 
 
@@ -44,8 +43,8 @@ class _Layout(NamedTuple):
     names: list[str]
     separator: str
     encoding: str
-    decimal: str
-    skipped: int = 1  # lines up to the header
+    has_quotes: bool = False
+    skipped: int = 1  # lines before the first row
 
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progress: OnProgress) -> None:
@@ -93,30 +92,31 @@ def _require_time(columns: ColumnMap, name: str) -> TimeColumn:
 
 
 def _layout(path: Path) -> _Layout:
-    """Return names, separator, encoding and decimal sign of a table."""
+    """Return the layout of a table."""
     if path.suffix.lower() == ".parquet":
         try:
-            return _Layout(pq.read_schema(path).names, "", "", ".")
+            return _Layout(pq.read_schema(path).names, "", "")
         except (pa.ArrowException, OSError) as error:
             raise ImportLogError(f"cannot be read: {error}") from error
-    with path.open("rb") as file:
-        head = file.read(1 << 16)
+    with path.open("rb") as binary:
+        head = binary.read(200)
     encoding = next((name for mark, name in _MARKS.items() if head.startswith(mark)), "utf-8")
-    if encoding == "utf-8" and b"\0" in head[:200]:
+    if encoding == "utf-8" and b"\0" in head:
         encoding = "utf-16-le" if head[1:2] == b"\0" else "utf-16-be"
-    lines = head.decode(encoding, "replace").splitlines()
-    comments = next((k for k, line in enumerate(lines) if not line.startswith(("#", "%"))), 0)
+    comment, line, skipped = "", "", 0
+    with path.open(encoding=encoding, errors="replace") as file:
+        while (line := file.readline(_MAX_LINE)) and (not line.strip() or line.startswith(("#", "%"))):
+            comment, skipped = line.strip() or comment, skipped + 1
+        others = "".join(file.readline(_MAX_LINE) for _ in range(20))
     # the header is the first line without a mark, or the last one with a mark if numbers follow it
-    above = comments - 1 if comments and lines[comments].lstrip()[:1] in "0123456789.-+" else comments
-    first, *others = lines[above : above + 20] or [""]
-    separator = max(",;\t|", key=first.count)
+    is_marked = comment and line.lstrip()[:1] in "0123456789.-+"
+    header = (comment if is_marked else line).strip()
+    separator = max(",;\t|", key=header.count)
     try:
-        names = [name.strip() for name in next(csv.reader([first.lstrip("#% ")], delimiter=separator), [])]
+        names = [name.strip() for name in next(csv.reader([header.lstrip("#% ")], delimiter=separator), [])]
     except csv.Error as error:
         raise ImportLogError(f"cannot be read: {error}") from error
-    cells = [cell for line in others for cell in line.split(separator)]
-    has_commas = separator != "," and any(map(_DECIMAL_COMMA.fullmatch, cells))
-    return _Layout(names, separator, encoding, "," if has_commas else ".", above + 1)
+    return _Layout(names, separator, encoding, '"' in line + others, skipped if is_marked else skipped + 1)
 
 
 def _batches(
@@ -148,7 +148,9 @@ def _batches(
             skip_rows=layout.skipped,
             use_threads=False,
         )
-        parse = pa.csv.ParseOptions(delimiter=layout.separator, invalid_row_handler=skip)
+        # a quote that damage has put in would swallow lines
+        quote = '"' if layout.has_quotes else False
+        parse = pa.csv.ParseOptions(delimiter=layout.separator, quote_char=quote, invalid_row_handler=skip)
         # decoded here: PyArrow does not pass rows that are no UTF-8 to `skip`
         with path.open("rb") as file, contextlib.ExitStack() as stack:
             text = codecs.EncodedFile(file, "utf-8", layout.encoding, "replace")
@@ -174,7 +176,7 @@ def _require(names: Sequence[str], columns: set[str], contents: LogContents) -> 
 def _numbers(batch: Any, column: str, layout: _Layout, texts: Counter[str]) -> Array:
     """Return the numbers of a column, NaN for texts, which are counted."""
     values = batch.column(batch.schema.get_field_index(column))
-    if pa.types.is_string(values.type) and layout.decimal == ",":
+    if pa.types.is_string(values.type) and layout.separator != ",":  # then a comma is a decimal one
         values = pc.replace_substring(values, ",", ".")
     try:
         numbers: Array = np.asarray(pc.fill_null(values.cast(pa.float64()), float("nan")))

@@ -132,6 +132,14 @@ def test_what_is_no_bag_of_ros_1_is_refused(content, what, tmp_path, columns_of_
     refused(what, tmp_path / "it.bag", columns=columns_of_bag)
 
 
+def test_bag_without_messages_is_refused(tmp_path, refused):
+    with (tmp_path / "it.mcap").open("wb") as file:
+        bag = writer.Writer(file)
+        bag.start()
+        bag.finish()
+    refused("holds no message", tmp_path / "it.mcap")
+
+
 @pytest.fixture
 def columns_of_bag(tmp_path):
     (tmp_path / "map.toml").write_text(test_bags.MAP)
