@@ -24,11 +24,10 @@ _MAX_WASTE = 20, 1 << 26  # sizes of the file, bytes: maximum size of records th
 
 
 class Records(Generic[Record]):
-    """Iterate over the sound records of a file; a format says where one may begin, its size, and whether it is sound.
+    """Iterate over the sound records of a file; a format says where one may begin, its size, and if it is sound."""
 
-    A record without a checksum is sound if another one follows, else some of its bytes may be missing. After a damaged
-    record the search goes on one byte behind its begin, since its size may be wrong.
-    """
+    # A record without a checksum is sound if another one follows, else some of its bytes may be missing. After a
+    # damaged record the search goes on one byte behind its begin, since its size may be wrong.
 
     mark: ClassVar[re.Pattern[bytes]]  # first bytes of a record, at most `head` of them
     head: ClassVar[int]  # bytes, from which the size of a record follows
