@@ -30,7 +30,7 @@ from controller.laws.deployable.gains import SPREADS, DeployableGains
 from controller.linear_algebra import cross, norm
 from controller.quadratic_program import Workspace
 from controller.regions.kinds import FIRST_OF_ATTITUDE, FLAT
-from controller.regions.region_set import PackedRegions, evaluate_packed, position_clearance
+from controller.regions.region_set import PackedRegions, evaluate_packed
 from controller.stack_array import Array, Columns6, Rows3, Vector3, Vector4, Vector6, VectorN, zeros
 from controller.state import State
 
@@ -42,8 +42,6 @@ _FIRM = (3.0, 3.0)  # decades by which slack costs more than missing the desired
 _LEAP = 0.5  # cosine of a gradient's turn within `_FD_STEP` below which the turn counts as a jump
 _MARGIN_OF_ATTITUDE = 0.02  # rad, margin of regions of attitude
 _TILT_PRICE = 1e-5  # price of a violated bound on tilt, times the squared inertia: below those of hard regions
-KEPT = 0.01  # m/s2, slack up to which a barrier counts as kept
-_BOUND_LEAP = 0.05  # m, fall of the bound in a step that counts as a jump: more than the vehicle's motion can cause
 
 
 class RegionObservation(State):
@@ -59,9 +57,7 @@ class RegionObservation(State):
     later_rotation_gradients: Rows3
     later_clearances: VectorN
     previous_rhs: VectorN  # m/s2, rad/s2: last right side of the barrier of each region's nearest face
-    bound: float  # m: lower bound of the clearances in this step, by `write_rows`, if no barrier yields
-    last_bound: float = np.nan  # m, `bound` of the last step; NaN without one
-    guaranteed_bound: float = np.nan  # m, of the clearances from now on; NaN without one
+    bound: float  # m: lower bound of the clearances by h and psi of this step, if nothing errs and no barrier yields
 
 
 class Motion(NamedTuple):
@@ -140,7 +136,7 @@ def observe_gradient(
     return exists, turning
 
 
-def _margin(n: Vector6, motion: Motion, deviations: Vector3, of_attitude: bool, gains: DeployableGains) -> float:
+def margin_of(n: Vector6, motion: Motion, deviations: Vector3, of_attitude: bool, gains: DeployableGains) -> float:
     """Return the margin [m, or rad] of a clearance with slope n, from the uncertainty of vehicle and region."""
     # `deviations` [m] are standard deviations of the region's position.
     variance = float(n[:3] ** 2 @ (motion.position_variance + deviations**2))
@@ -175,7 +171,7 @@ def write_rows(
         if not exists:
             continue
         braking = gains.turning_deceleration if of_attitude else motion.braking
-        margin = _margin(n, motion, regions.deviations[i], of_attitude, gains)
+        margin = margin_of(n, motion, regions.deviations[i], of_attitude, gains)
         scale = square(motion.mass)
         if of_attitude:  # weighted by the squared gradients over position [rad2/m2] and attitude [1]
             scale = scale * float(n[:3] @ n[:3]) + square(motion.inertia) * float(n[3:] @ n[3:])
@@ -194,7 +190,7 @@ def write_rows(
                 if not distance < np.inf:
                     break
                 n[:3] = face_normal
-                margin = _margin(n, motion, regions.deviations[i], of_attitude, gains)
+                margin = margin_of(n, motion, regions.deviations[i], of_attitude, gains)
                 turning = 0.0  # the gradient of a flat face is constant
 
             # h, its rate, and its second derivative without thrust
@@ -270,24 +266,3 @@ def write_tilt_rows(
             work, rows, n, motion.thruster_acceleration, rhs, _TILT_PRICE / square(motion.inertia), lower, upper
         )
     return rows
-
-
-def vehicle_bound(regions: PackedRegions, position: Vector3, motion: Motion, gains: DeployableGains) -> float:
-    """Return the lower bound [m] of the vehicle's own clearances now, at most 0: it follows the point with barriers."""
-    # `regions` are at their present positions, and the vehicle at a `position` [m, NED].
-    bound, n = 0.0, zeros(6)
-    for i in range(regions.kinds.size):
-        if regions.hard[i] and regions.kinds[i] < _ATTITUDE:
-            clearance = position_clearance(regions, i, position, n[:3])
-            bound = min(bound, gains.margin + clearance - _margin(n, motion, regions.deviations[i], False, gains))
-    return bound
-
-
-def update_guarantee(observation: RegionObservation, slack: float) -> None:
-    """Raise the guaranteed lower bound of the clearances to a higher bound of this step."""
-    # A falling bound does not lower the guarantee, which would else follow any violation. The guarantee is reset if a
-    # barrier yields by more than `KEPT`, or if the bound jumps, since then regions or estimate jumped.
-    o = observation
-    if slack > KEPT or not o.bound >= o.last_bound - _BOUND_LEAP:
-        o.guaranteed_bound = o.bound
-    o.guaranteed_bound, o.last_bound = max(o.guaranteed_bound, o.bound), o.bound

@@ -29,17 +29,24 @@ from controller.laws.deployable.actuator_lag import predict_state
 from controller.laws.deployable.attitude import empty_attitude
 from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
 from controller.laws.deployable.barrier import (
-    KEPT,
     Motion,
     RegionObservation,
     observe_regions,
     predict_shifts,
-    update_guarantee,
-    vehicle_bound,
     write_rows,
     write_tilt_rows,
 )
 from controller.laws.deployable.braking import max_upright_speed, min_forces
+from controller.laws.deployable.clearance_bound import (
+    KEPT,
+    error_loss,
+    max_slack,
+    measure_error,
+    predict_point,
+    update_bound,
+    vehicle_bound,
+    withdraw_bound,
+)
 from controller.laws.deployable.diagnostics import (
     DIAGNOSTICS,
     NO_BOUND,
@@ -98,7 +105,7 @@ def step(
         thrusters.forces = forces
         memory.report.time_since_measurement = estimate.time_since_measurement
         clear_report(memory.report)
-        memory.observation.guaranteed_bound = memory.observation.last_bound = np.nan
+        withdraw_bound(memory.bound)
         memory.expected[:] = np.nan
         return
 
@@ -180,31 +187,31 @@ def step(
         memory.position_variance,
         np.max(memory.deviation[6:9]),
     )
-    rows = 0
-    memory.observation.bound = NO_BOUND
+    raised = measure_error(memory.bound, motion, gains, period)
+    rows, bound, yields = 0, NO_BOUND, memory.report.constraint_slack > KEPT
     if gains.barriers > 0.0:
-        yields = memory.report.constraint_slack > KEPT  # yielding barriers amplify noise
-        rows = write_rows(
+        rows = write_rows(  # yielding barriers amplify noise
             work, memory.observation, regions_ahead, memory.weights[1], motion, lower, upper,
             fraction if yields else 1.0, gains,
         )  # fmt: skip
-        vehicle = vehicle_bound(regions, estimate.position, motion, gains)
-        memory.observation.bound = min(memory.observation.bound, vehicle)
+        bound = min(memory.observation.bound, vehicle_bound(regions, estimate.position, motion, gains))
     constraints = write_tilt_rows(work, rows, thrusters.metric, R_ahead[2], motion, lower, upper, gains)
 
     # quadratic program
     steps = quadratic_program.solve(work, constraints, thrusters.inverse, lower, upper, forces)
+    slack = max_slack(work, rows, forces)
+    predict_point(memory.bound, motion, forces, period)
     model.command_forces(thrusters, forces)
     thrusters.forces = forces
     memory.estimate[0] = estimate.net_weight
     memory.estimate[1:] = estimate.moments
     write_report(memory.report, estimate, memory.plan.cost[TOTAL], memory.plan.points, thrusters.health, desired)
-    write_program_report(memory.report, work.multipliers, work.price, rows, steps)
+    write_program_report(memory.report, work.multipliers, slack, rows, steps)
+    memory.report.acceleration_error = gains.barrier_rate * memory.bound.error
     beyond = max(spread - 2.0 * _TRUSTED_SPREAD, 0.0)  # spread that the margins do not cover
-    slack = memory.report.constraint_slack
-    update_guarantee(memory.observation, slack)
-    firm = slack / (gains.barrier_rate * gains.barrier_slope)
-    memory.report.bound = memory.observation.guaranteed_bound - beyond - firm
+    loss = beyond + error_loss(memory.bound, estimate, slack, lag, gains)
+    update_bound(memory.bound, bound, loss, raised or yields or slack > KEPT)
+    memory.report.bound = memory.bound.bound
 
 
 def _hold_weight(memory: DeployableMemory, R: Matrix3, gains: DeployableGains, forces: Array) -> None:

@@ -41,6 +41,7 @@ DIAGNOSTICS = (
         "Lowest estimated limit of a thruster, as a fraction of that in the vehicle's file; NaN: none",
     ),
     Diagnostic("drag", "", "Estimated drag of translation, relative to the vehicle's file; NaN: none"),
+    Diagnostic("acceleration_error", "m/s2", "Maximum error of the predicted acceleration of late, by the innovations"),
 )
 
 
@@ -62,11 +63,12 @@ class Report(State):
     rejected: float  # fraction
     thrust_limit: float  # dimensionless, relative to the vehicle's
     drag: float  # relative to the vehicle's
+    acceleration_error: float  # m/s2
 
 
 def clear_report(report: Report) -> None:
     """Write that there is no bound, and no estimate of limits and drag."""
-    report.bound, report.thrust_limit, report.drag = NO_BOUND, np.nan, np.nan
+    report.bound = report.thrust_limit = report.drag = report.acceleration_error = NO_BOUND
 
 
 def write_report(report: Report, estimate: Estimate, cost: float, points: int, health: Array, desired: Vector3) -> None:
@@ -86,10 +88,8 @@ def write_report(report: Report, estimate: Estimate, cost: float, points: int, h
             report.thrust_limit = min(report.thrust_limit, estimate.state[EFFECTIVENESS + health.size + j])
 
 
-def write_program_report(report: Report, multipliers: Array, price: Array, rows: int, steps: int) -> None:
+def write_program_report(report: Report, multipliers: Array, slack: float, rows: int, steps: int) -> None:
     """Write the numbers of barriers and quadratic program."""
-    report.barriers, report.constraint_slack, report.qp_steps = 0.0, 0.0, steps
+    report.barriers, report.constraint_slack, report.qp_steps = 0.0, slack, steps
     for i in range(rows):
-        if multipliers[i] > 0.0:
-            report.barriers += 1.0
-            report.constraint_slack = max(report.constraint_slack, multipliers[i] * price[i])
+        report.barriers += 1.0 if multipliers[i] > 0.0 else 0.0

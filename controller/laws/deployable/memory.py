@@ -8,6 +8,7 @@ from typing import Annotated
 from controller.laws.deployable.actuator_lag import PredictedState
 from controller.laws.deployable.attitude import Attitude
 from controller.laws.deployable.barrier import RegionObservation
+from controller.laws.deployable.clearance_bound import ClearanceBound
 from controller.laws.deployable.diagnostics import Report
 from controller.laws.deployable.estimate import Estimate
 from controller.laws.deployable.fault_detection import FaultState
@@ -36,6 +37,7 @@ class DeployableMemory(State):
     fault_state: FaultState
     plan: PathPlan
     observation: RegionObservation
+    bound: ClearanceBound
     program: Workspace
     predicted: PredictedState
     expected: Vector6  # m, NED, and m/s, body: predicted position and velocity at the next step; NaN if unknown

@@ -5,11 +5,12 @@ import copy
 import numpy as np
 import pytest
 
-from controller.laws.deployable import barrier, faces
+from controller.laws.deployable import barrier, clearance_bound, faces
+from controller.laws.deployable.estimate import VELOCITY, make_estimate
 from controller.laws.deployable.gains import DeployableGains
 from controller.quadratic_program import empty_workspace
 from controller.regions import Box, Ellipsoid, HalfSpace, Orientation, Region, Sphere, Visibility, pack
-from tests.controller.deployable.scenery import LEVEL
+from tests.controller.deployable.scenery import LEVEL, ODIN
 
 GAINS = DeployableGains()
 AHEAD = 1e-4  # s
@@ -195,23 +196,72 @@ def test_barrier_right_side_is_smoothed_while_violated():
         sight = own
 
 
-def test_promised_clearance_rises_with_the_bound_and_falls_only_with_slack_or_a_jump():
-    observation = barrier.RegionObservation(n=0)
+def test_bound_rises_with_the_clearance_and_falls_only_by_restarts_and_jumps():
+    b = clearance_bound.ClearanceBound()
 
-    def promise(bound, slack=0.0):
-        observation.bound = bound
-        barrier.update_guarantee(observation, slack)
-        return observation.guaranteed_bound
+    def bound(now, restarts=False, loss=0.0):
+        clearance_bound.update_bound(b, now, loss, restarts)
+        return b.bound
 
-    assert promise(-0.2) == -0.2  # the first: a start within a region
-    assert promise(-0.16) == -0.16
-    assert promise(-0.19) == -0.16  # falls without a reason: the promise stands, and can turn out false
-    assert promise(-0.23) == -0.16
-    assert promise(-0.24, slack=0.009) == -0.16
-    assert promise(-0.25, slack=0.011) == -0.25  # a barrier yields
-    assert promise(0.0) == 0.0
-    assert promise(-0.06) == -0.06  # more than any motion within a step: a region has leapt
-    assert promise(-0.02) == -0.02
+    assert bound(-0.2) == -0.2  # the first: a start within a region
+    assert bound(-0.16) == -0.16
+    assert bound(-0.19) == -0.16  # falls without a reason: the bound stands, and can turn out false
+    assert bound(-0.23) == -0.16
+    assert bound(-0.25, restarts=True) == -0.25
+    assert bound(0.0, loss=0.03) == -0.03
+    assert bound(-0.06) == -0.06  # more than any motion within a step: a region has leapt
+    assert bound(-0.02) == -0.02
+
+
+@pytest.mark.parametrize("period", [0.01, 0.05])
+def test_error_of_the_acceleration_is_found_in_the_corrections_of_any_estimate(period):
+    """Lemma 1 of docs/theory.md: what errors add to psi, and what corrections add, differ by twice the velocity's."""
+    rng, gains, worst = np.random.default_rng(8), GAINS, 0.0
+    for case in range(20):
+        b, true, seen, added = clearance_bound.ClearanceBound(), np.zeros(3), np.zeros(3), np.zeros(3)
+        size, gain, wrong = rng.uniform(0.05, 1.0), rng.uniform(0.01, 0.5), 0.0
+        for k in range(400):
+            motion = moving(rng, np.r_[seen, np.zeros(3)])._replace(position=np.zeros(3))
+            b.position = motion.position  # positions are not corrected here
+            clearance_bound.measure_error(b, motion, gains, period)
+            wrong = max(wrong, np.linalg.norm(true - seen))
+            assert np.linalg.norm(added - b.by_velocity) <= 2.0 * wrong + 1e-12
+            forces = rng.normal(size=8)
+            clearance_bound.predict_point(b, motion, forces, period)
+            error = size * np.sign(np.sin(0.02 * case * k + case)) * np.ones(3)
+            added = (1.0 - gains.barrier_rate * period) * added + period * error
+            true = true + (b.velocity - motion.velocity[:3]) + period * error
+            seen = b.velocity + gain * (true - b.velocity + 0.01 * rng.normal(size=3))
+        worst = max(worst, b.error)
+    assert worst > 0.1
+
+
+def test_theorem_holds_for_the_errors_that_it_admits():
+    """docs/theory.md: a point that brakes before a wall by its row alone, with random errors and with lasting ones."""
+    rng, period, kappa, rate, nearest = np.random.default_rng(9), 0.002, GAINS.barrier_slope, GAINS.barrier_rate, np.inf
+    b, seen = clearance_bound.ClearanceBound(), make_estimate(ODIN)
+    seen.covariance[:] = 0.0
+    for case in range(60):
+        braking, size, omega, slack = rng.uniform([0.1, 0.0, 0.0, 0.0], [2.0, 0.2, 0.05, 0.3])
+        d, v = rng.uniform(-0.2, 1.0), rng.uniform(-1.2, 0.3)  # true clearance; estimated rate
+        h = d - GAINS.margin - rng.uniform(0.0, 0.1)
+        begin = min(GAINS.margin + h, (v + allowed(h, braking, kappa)[0]) / kappa, 0.0)
+        by_position, by_velocity, lowest = 0.0, size, d
+        error = size
+        for _ in range(4000):
+            phi, slope = allowed(h, braking, kappa)
+            acceleration = -rate * (v + phi) - slope * v - slack  # no more than the row asks for
+            aim = -size if case % 2 else rng.uniform(-size, size)
+            correction = aim - (1.0 - rate * period) * by_velocity
+            d, predicted = d + period * (v - omega), h + period * v
+            h, v = min(predicted, d - GAINS.margin), v + period * acceleration + correction
+            by_velocity, by_position = aim, (1.0 - rate * period) * by_position + h - predicted
+            error, lowest = max(error, abs(by_velocity) + kappa * abs(by_position)), min(lowest, d)
+        b.error, seen.covariance[VELOCITY, VELOCITY] = error, (omega / 3.0) ** 2
+        loss = clearance_bound.error_loss(b, seen, slack, 0.0, GAINS)
+        assert lowest >= begin - loss - 1e-3, case
+        nearest = min(nearest, lowest - begin + loss)
+    assert nearest < 0.05
 
 
 def test_gradient_rate_is_zero_at_a_switch_of_flat_faces():

@@ -142,7 +142,7 @@ def test_without_measurements_forces_are_zero():
 
     law = law_for(REGIONS)
     names = [diagnostic.name for diagnostic in law.diagnostics]
-    unknown = [names.index(name) for name in ("bound", "thrust_limit", "drag")]
+    unknown = [names.index(name) for name in ("bound", "thrust_limit", "drag", "acceleration_error")]
     assert np.isnan(law.report[unknown]).all()
     assert not fly(law, Sea(), steps=50, change=nothing).any()
     assert np.isnan(law.report[unknown]).all()
@@ -191,7 +191,7 @@ def test_conflicting_regions_keep_the_promised_clearances():
 
     fly(own, sea, regions=[plate, band], steps=2500, each=check)
     clearance, bound = np.array(rows).T
-    assert clearance.min() < -0.05 and bound[:500].max() == 0.0
+    assert clearance.min() < -0.05 and -0.1 < bound[:500].max() <= 0.0
     assert np.all(clearance[1:] >= bound[:-1] - 1e-3)
 
 

@@ -156,9 +156,9 @@ def test_report_holds_the_diagnostics():
     assert np.concatenate(report[:3]).tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
     assert (report.desired_speed, report.path_cost, report.path_corners) == (7.0, 9.5, 3.0)
     assert (report.failed_thruster, report.time_since_measurement) == (3.0, -1.0)
-    program = np.array([0.0, 2.0, 3.0, 9.0]), np.array([1.0, 0.5, 0.1, 9.0]), 3, -6
+    program = np.array([0.0, 2.0, 3.0, 9.0]), 1.5, 3, -6
     diagnostics.write_program_report(report, *program)
-    assert (report.barriers, report.constraint_slack, report.qp_steps) == (2.0, 1.0, -6.0)
+    assert (report.barriers, report.constraint_slack, report.qp_steps) == (2.0, 1.5, -6.0)
 
 
 # ---- what is believed ----

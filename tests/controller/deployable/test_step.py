@@ -5,7 +5,15 @@ import copy
 import numpy as np
 import pytest
 
-from controller.laws.deployable import actuator_lag, attitude, barrier, deployable_law, input_validation, model
+from controller.laws.deployable import (
+    actuator_lag,
+    attitude,
+    barrier,
+    clearance_bound,
+    deployable_law,
+    input_validation,
+    model,
+)
 from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
 from controller.laws.deployable.estimate import CURRENT, EFFECTIVENESS, LAG, MOMENTS, VELOCITY, publish
 from controller.laws.deployable.gains import DeployableGains
@@ -65,7 +73,7 @@ def expected(memory, state, goal, regions, weights):
     rates = 0.02 / (0.02 + np.where(regions.hard, GAINS.price_smoothing, 0.0))
     stages = memory.weights[0] + rates * (weights - memory.weights[0])
     smoothed = memory.weights[1] + rates * (stages - memory.weights[1])
-    fraction = 0.02 / (0.02 + GAINS.smoothing) if memory.report.constraint_slack > barrier.KEPT else 1.0
+    fraction = 0.02 / (0.02 + GAINS.smoothing) if memory.report.constraint_slack > clearance_bound.KEPT else 1.0
     rows = barrier.write_rows(
         memory.program, memory.observation, regions, smoothed, motion, lower, upper, fraction, GAINS
     )
@@ -135,17 +143,22 @@ def test_soft_region_pushes_back_by_the_depth_in_the_goal_relative_to_the_end_of
     assert nominal[0] - nominal[1] == pytest.approx(memory.thrusters.allocator @ wrench, rel=1e-9, abs=1e-9)
 
 
-def test_promised_clearance_is_less_by_the_spread_beyond_the_margins_and_by_the_slack():
+def test_bound_is_less_by_the_spread_beyond_the_margins_and_by_errors_and_slack():
     """Between two walls that contradict each other; three deviations up to 0.6 m are in the margins."""
     walls = [Region(f"wall {sign}", HalfSpace((sign * 0.5, 0.0, 0.0), (-sign, 0.0, 0.0)), "in") for sign in (1.0, -1.0)]
     own, sea, forces = law_for(walls), Sea(), np.empty(8)
     deviation = np.r_[0.25, np.zeros(11)]
     for _ in range(3):
         own.step(sea.measured()._replace(deviation=deviation), pack([GOAL]), pack(walls), np.ones(2), forces)
-    spread = 3.0 * np.sqrt(own.memory.state_estimate.covariance[0, 0] + 0.25**2)
-    slack = own.memory.report.constraint_slack / (GAINS.barrier_rate * GAINS.barrier_slope)
-    assert spread > 0.65 and slack > 0.01 and abs(own.memory.observation.guaranteed_bound) > 0.01
-    assert own.report[16] == pytest.approx(own.memory.observation.guaranteed_bound - (spread - 0.6) - slack, rel=1e-12)
+    memory = own.memory
+    spread = 3.0 * np.sqrt(memory.state_estimate.covariance[0, 0] + 0.25**2)
+    slack, error = memory.report.constraint_slack / 4.0, memory.report.acceleration_error / 4.0
+    unsure = 3.0 * np.sqrt(np.diag(memory.state_estimate.covariance)[3:6].max())
+    lost = ((2.0 + 4.0 * memory.state_estimate.state[LAG]) * error + unsure + slack) / 1.5 - 0.03
+    assert spread > 0.65 and slack > 0.05 and error > 0.05
+    # the estimate is 0.5 m from both walls at most, less what the margins have of the spread
+    assert own.report[16] == pytest.approx(memory.bound.last - (spread - 0.6) - lost, rel=1e-12)
+    assert memory.bound.last <= 0.5 - 0.6
 
 
 def test_unequal_effectiveness_causes_no_opposing_forces_at_a_barrier():
