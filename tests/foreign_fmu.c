@@ -4,10 +4,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OK, ERROR, FATAL, DISCARD, END, HANG, NOT_A_NUMBER, NULL_MESSAGE, SHORT, WARNED, PERCENT, NO_INPUT, FORMATS };
+enum {
+    OK, ERROR, FATAL, DISCARD, END, HANG, NOT_A_NUMBER, NULL_MESSAGE, SHORT, WARNED, PERCENT, NO_INPUT, FORMATS, TETHER,
+    CURRENT, PUCK
+};
 
 /* places in v, which are the value references */
-enum { MODE, AT, GAIN, INPUTS = 10, OUTPUTS = 20, NO_ROLLBACK = 29, MATRIX = 30, SIZE = 34 };
+enum { MODE, AT, GAIN, START, INPUTS = 10, OUTPUTS = 20, NO_ROLLBACK = 29, MATRIX = 30, POSE = 40, MOVED = 52, SIZE = 56 };
 
 #if FMI == 2
 #include "fmi2Functions.h"
@@ -52,6 +55,48 @@ static void transfer(Fmu *f, const unsigned r[], size_t n, double *x, bool set)
         }
 }
 
+/* A line to the surface: position in, force out, world frame NED. */
+static void tether(Fmu *f, double h)
+{
+    const double *r = f->v + INPUTS, length = sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2]), before = f->v[MOVED];
+    const double tension = length > 1.0 ? f->v[GAIN] * (length - 1.0) + 50.0 * (length - before) / h : 0.0;
+
+    f->v[MOVED] = length;
+    for (int i = 0; i < 3; i++)
+        f->v[OUTPUTS + i] = tension > 0.0 ? -tension * r[i] / length : 0.0;
+}
+
+/* A current that sets in, and turns with depth: depth in, velocity north and east out. */
+static void current(Fmu *f, double t)
+{
+    const double speed = f->v[GAIN] * (1.0 - exp(-t / 2.0));
+
+    f->v[OUTPUTS] = speed * cos(0.3 * f->v[INPUTS]);
+    f->v[OUTPUTS + 1] = speed * sin(0.3 * f->v[INPUTS]);
+}
+
+/* A plant without drag, of mass GAIN, which turns about its vertical axis: wrench in, position, angles and their
+   rates out, world frame NED. */
+static void puck(Fmu *f, double h)
+{
+    const double *wrench = f->v + INPUTS, yaw = f->v[POSE + 5], c = cos(yaw), s = sin(yaw), m = f->v[GAIN];
+    const double force[] = {c * wrench[0] - s * wrench[1], s * wrench[0] + c * wrench[1], wrench[2]};
+
+    for (int i = 0; i < 3; i++) {
+        f->v[POSE + 6 + i] += h * force[i] / m;
+        f->v[MOVED + i] += h * f->v[POSE + 6 + i];
+        f->v[POSE + i] = f->v[START + i] + f->v[MOVED + i];
+    }
+    f->v[POSE + 11] += h * wrench[5] / m;
+    f->v[POSE + 5] += h * f->v[POSE + 11];
+}
+
+static STATUS begin(Fmu *f)
+{
+    memcpy(f->v + POSE, f->v + START, 3 * sizeof f->v[0]);
+    return S(OK);
+}
+
 static STATUS step(Fmu *f, double now, double h, bool no_rollback)
 {
     const int mode = now >= f->v[AT] - 1e-9 ? (int)f->v[MODE] : OK;
@@ -60,6 +105,12 @@ static STATUS step(Fmu *f, double now, double h, bool no_rollback)
     f->v[NO_ROLLBACK] = no_rollback;
     for (int i = 0; i < NO_ROLLBACK - OUTPUTS; i++)
         f->v[OUTPUTS + i] = mode == NOT_A_NUMBER ? NAN : f->v[GAIN] * f->v[INPUTS + i];
+    if (mode == TETHER)
+        tether(f, h);
+    else if (mode == CURRENT)
+        current(f, now + h);
+    else if (mode == PUCK)
+        puck(f, h);
     if (mode == DISCARD || mode == END || mode == SHORT)
         f->last = now + 0.5 * h;
     switch (mode) {
@@ -123,7 +174,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component f, fmi2Boolean a, fmi2Real toleranc
     return fmi2OK;
 }
 fmi2Status fmi2EnterInitializationMode(fmi2Component f) { return (void)f, fmi2OK; }
-fmi2Status fmi2ExitInitializationMode(fmi2Component f) { return (void)f, fmi2OK; }
+fmi2Status fmi2ExitInitializationMode(fmi2Component f) { return begin(f); }
 fmi2Status fmi2GetReal(fmi2Component f, const fmi2ValueReference r[], size_t n, fmi2Real x[])
 {
     transfer(f, r, n, x, false);
@@ -164,7 +215,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance f, fmi3Boolean a, fmi3Float6
     ((Fmu *)f)->time = start;
     return fmi3OK;
 }
-fmi3Status fmi3ExitInitializationMode(fmi3Instance f) { return (void)f, fmi3OK; }
+fmi3Status fmi3ExitInitializationMode(fmi3Instance f) { return begin(f); }
 fmi3Status fmi3GetFloat64(fmi3Instance f, const fmi3ValueReference r[], size_t n, fmi3Float64 x[], size_t m)
 {
     (void)m;

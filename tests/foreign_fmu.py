@@ -14,7 +14,7 @@ from tests.architecture.modules import ROOT
 
 MODES = (
     "ok", "error", "fatal", "discard", "end", "hang", "nan", "null message", "short", "warned", "percent", "no input",
-    "formats",
+    "formats", "tether", "current", "puck",
 )  # fmt: skip
 PARAMETERS = {"mode": 0, "at": 1, "gain": 2}
 INPUTS = {f"u{i}": 10 + i for i in range(8)}
@@ -22,7 +22,9 @@ OUTPUTS = {f"y{i}": 20 + i for i in range(8)}
 STATE = {2: "canGetAndSetFMUstate", 3: "canGetAndSetFMUState"}
 
 
-def build_foreign_fmu(path, fmi, inputs=INPUTS, outputs=OUTPUTS, units=(), array=False, **attributes):
+def build_foreign_fmu(
+    path, fmi, inputs=INPUTS, outputs=OUTPUTS, units=(), array=False, parameters=PARAMETERS, **attributes
+):
     """Write the FMU, with variables by name and value reference, and further attributes of CoSimulation; return it."""
     token = "{foreign}"
     root = ET.Element(
@@ -36,7 +38,7 @@ def build_foreign_fmu(path, fmi, inputs=INPUTS, outputs=OUTPUTS, units=(), array
         for unit in sorted(set(dict(units).values())):
             ET.SubElement(definitions, "Unit", name=unit)
     listed = ET.SubElement(root, "ModelVariables")
-    kinds = (("parameter", "tunable", PARAMETERS), ("input", "continuous", inputs), ("output", "continuous", outputs))
+    kinds = (("parameter", "tunable", parameters), ("input", "continuous", inputs), ("output", "continuous", outputs))
     for causality, variability, variables in kinds:
         for name, reference in variables.items():
             common = {
@@ -58,7 +60,7 @@ def build_foreign_fmu(path, fmi, inputs=INPUTS, outputs=OUTPUTS, units=(), array
             ET.SubElement(matrix, "Dimension", start="2")
     structure = ET.SubElement(root, "ModelStructure")
     if fmi == 2:
-        first = 1 + len(PARAMETERS) + len(inputs)
+        first = 1 + len(parameters) + len(inputs)
         section = ET.SubElement(structure, "Outputs")
         for i in range(len(outputs)):
             ET.SubElement(section, "Unknown", index=str(first + i))

@@ -19,15 +19,19 @@ from cosim.scenario.law_factory import law_of, require_builtin_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import start_values
 from cosim.simulation.bindings import BoundLaw, bind_rules
-from cosim.simulation.columns import columns_of
+from cosim.simulation.columns import channels_of_run, columns_of_channels
+from cosim.simulation.component_map import fmus_beside
+from cosim.simulation.components import Components
 from cosim.simulation.fmu_law import FmuLaw
+from cosim.simulation.fmu_plant import FmuPlant
 from cosim.simulation.make_step import NO_CLOCK, exchanged_variables, make_data, make_model, make_noise, step_signals
 from cosim.simulation.signals import Signals
-from cosim.simulation.stepped_plant import plant_calls
+from cosim.simulation.step_functions import load_plant
+from cosim.simulation.stepped_plant import BoundPlant, plant_calls
 from cosim.step.score import FlightMetrics, fly
 from cosim.step.step_model import Array, Integers, StepData, StepModel
 from fuzzy_arbiter import Arbiter
-from plant_fmu import Plant, PlantError
+from plant_fmu import PlantError
 
 
 class FusedFlyer:
@@ -43,11 +47,7 @@ class FusedFlyer:
         if base.law.fmu is None:
             require_builtin_law(base)
         self._open = contextlib.ExitStack()
-        self._plant = self._open.enter_context(Plant(base.vehicle))
-        self._law: FmuLaw | None = None
-        if base.law.fmu:
-            self._law = FmuLaw(base)
-            self._open.callback(self._law.close)
+        self._vehicle = self._open.enter_context(FlownVehicle(base))
 
     def fly(self, values: Array, seeds: NDArray[np.int64]) -> BatchResult:
         """Fly a batch; values (rows, keys), seeds (rows,)."""
@@ -55,7 +55,7 @@ class FusedFlyer:
         for row, (row_values, seed) in enumerate(zip(values, seeds, strict=True)):
             try:
                 scenario = self.variation.scenario(row_values.tolist(), int(seed))
-                metrics, model, data, _ = fly_scenario(self._plant, scenario, law=self._law)
+                metrics, model, data, _ = self._vehicle.fly(scenario)
                 outcomes[row], arrivals[row] = _outcome(metrics, model, data), arrivals_of(data.arrivals)
             except (ScenarioError, PlantError) as error:
                 refused[row] = str(error)
@@ -63,7 +63,7 @@ class FusedFlyer:
 
     def fly_one(self, scenario: Scenario, trace: bool = False) -> tuple[NDArray[np.void], Rows]:
         """Fly one scenario of the variation; return its outcome, shape (), and its signals at each control step."""
-        metrics, model, data, signals = fly_scenario(self._plant, scenario, trace, law=self._law)
+        metrics, model, data, signals = self._vehicle.fly(scenario, trace)
         return _outcome(metrics, model, data), signals
 
     def close(self) -> None:
@@ -95,32 +95,74 @@ def _fixed_keys(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
     }
 
 
-def fly_scenario(
-    plant: Plant, scenario: Scenario, trace: bool = False, clock: Integers = NO_CLOCK, law: FmuLaw | None = None
-) -> tuple[FlightMetrics, StepModel, StepData, Rows]:
-    """Reset plant and FMU of the law, and fly a scenario; return the signals at control steps if a trace is wanted."""
-    if law is not None:
-        law.restart(scenario)
-    made = law or law_of(scenario)
-    plant.reset()
-    plant.set(start_values(scenario))
-    plant.initialize()
-    # an FMU may ask for any signal of a record
-    inputs, outputs = (plant.inputs.names, plant.outputs.names) if law else exchanged_variables(scenario)
-    calls = plant_calls(scenario.vehicle, plant.native(inputs, outputs), plant.native)
-    model = make_model(scenario, made, clock, for_record=law is not None)
-    signals = Signals(columns_of(scenario, plant, law)) if law else step_signals(scenario, made, inputs, outputs)
-    data = make_data(scenario, model, made, signals, inputs, outputs, make_noise(scenario))
-    bound_law, rules = BoundLaw(made, model, data, signals), bind_rules(scenario.rules.system, data)
-    decisions = -(-scenario.steps // scenario.control_every)
-    rows = np.zeros((decisions if trace else 0, signals.row.size))
-    metrics = FlightMetrics()
-    BoundCall(fly, (model, data, calls, metrics, np.zeros(len(inputs)), rows)).call()
-    bound_law.raise_error()
-    rules.raise_error()
-    columns = signals.columns
-    flown = Rows(columns, {column.name: values for column, values in zip(columns, rows.T, strict=True)})
-    return metrics, model, data, flown
+class FlownVehicle:
+    """Plant, FMUs beside it, and the law's FMU, which fly one scenario of the same FMUs after another."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._open = contextlib.ExitStack()
+        try:
+            self._plant = load_plant(scenario)
+            self._open.callback(self._plant.close)
+            self._components = Components(scenario, self._plant)
+            self._open.callback(self._components.close)
+            self._law = FmuLaw(scenario) if scenario.law.fmu else None
+            if self._law:
+                self._open.callback(self._law.close)
+        except BaseException:
+            self.close()
+            raise
+
+    def fly(
+        self, scenario: Scenario, trace: bool = False, clock: Integers = NO_CLOCK
+    ) -> tuple[FlightMetrics, StepModel, StepData, Rows]:
+        """Reset all of them, and fly a scenario; return the signals at control steps if a trace is wanted."""
+        if self._law is not None:
+            self._law.restart(scenario)
+        law, plant = self._law or law_of(scenario), self._plant
+        if isinstance(plant, FmuPlant):
+            plant.restart(scenario)
+        else:
+            plant.reset()
+            plant.set(start_values(scenario))
+            plant.initialize()
+        # an FMU may ask for any signal of a record
+        for_record = self._law is not None or bool(fmus_beside(scenario))
+        channels = channels_of_run(scenario)
+        inputs, outputs = exchanged_variables(scenario)
+        if for_record:
+            inputs, outputs = (tuple(c.name for c in kind) for kind in (channels.inputs, channels.outputs))
+        model = make_model(scenario, law, clock, for_record)
+        signals = step_signals(scenario, law, inputs, outputs)
+        if for_record:
+            signals = Signals(columns_of_channels(scenario, *channels, law.diagnostics))
+        flags = tuple(c.name for c in channels.flags) if isinstance(plant, FmuPlant) else ()
+        data = make_data(scenario, model, law, signals, inputs, outputs, make_noise(scenario), flags)
+        if isinstance(plant, FmuPlant):
+            calls = BoundPlant(scenario, plant, data, native=False, inputs=inputs).calls
+        else:
+            calls = plant_calls(scenario.vehicle, plant.native(inputs, outputs), plant.native)
+        if fmus_beside(scenario):
+            self._components.bind(scenario, model, data, signals, list(inputs), calls.native.inputs)
+        bound_law, rules = BoundLaw(law, model, data, signals), bind_rules(scenario.rules.system, data)
+        decisions = -(-scenario.steps // scenario.control_every)
+        rows = np.zeros((decisions if trace else 0, signals.row.size))
+        metrics = FlightMetrics()
+        BoundCall(fly, (model, data, calls, metrics, np.zeros(len(inputs)), rows)).call()
+        for part in (bound_law, rules, self._components):
+            part.raise_error()
+        columns = signals.columns
+        flown = Rows(columns, {column.name: values for column, values in zip(columns, rows.T, strict=True)})
+        return metrics, model, data, flown
+
+    def close(self) -> None:
+        """Free all of them. May be called twice."""
+        self._open.close()
+
+    def __enter__(self) -> FlownVehicle:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 def _outcome(metrics: FlightMetrics, model: StepModel, data: StepData) -> NDArray[np.void]:

@@ -28,9 +28,10 @@ from cosim.simulation.bindings import rules_text
 from cosim.simulation.make_step import exchanged_variables, make_data, make_model, make_noise, step_signals
 from cosim.simulation.step_functions import FLAT, INTEGERS, step_functions
 from cosim.step.arbiter_inputs import compute_inputs
-from cosim.step.fmu_call import FmuCalls, call_law
+from cosim.step.fmu_call import ComponentCalls, FmuCalls, call_law, exchange_component, step_component
 from cosim.step.one_step import locate
 from cosim.step.plant_calls import Clock
+from cosim.step.plant_fmu_call import VehicleMap, step_plant_fmu, write_outputs
 from cosim.step.score import FlightMetrics, fly
 from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
@@ -60,7 +61,14 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     yield compute_inputs, (model.inputs, goal, regions, state, 0.0, FLAT, data.signals)
     references = np.zeros(1, np.uint32)
     native = Native(0, 0, 0, 0, references, FLAT, references, FLAT, INTEGERS, FLAT)
-    yield call_law, (FmuCalls(native, 0.01, INTEGERS, INTEGERS, FLAT, FLAT), model, data, FLAT)
+    fmu = FmuCalls(native, 0.01, INTEGERS, INTEGERS, FLAT, FLAT)
+    component = ComponentCalls(fmu, 0, INTEGERS, INTEGERS, FLAT)
+    vehicle = VehicleMap(INTEGERS, INTEGERS, np.zeros((1, 2), np.int64), 0, _TABLE, FLAT, FLAT)
+    yield call_law, (fmu, model, data, FLAT)
+    yield step_component, (component, model, data)
+    yield exchange_component, (component, model, data)
+    yield step_plant_fmu, (component, vehicle, model, data)
+    yield write_outputs, (vehicle, FLAT)
     *_, (function, arguments), start = step_functions(scenario, law)
     yield fly, (*arguments[:3], FlightMetrics(), FLAT, arguments[-1])
     yield function, arguments

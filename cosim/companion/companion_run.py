@@ -27,7 +27,7 @@ from cosim.results.recorder import Recorder
 from cosim.results.run_result import Run
 from cosim.results.wording import DRY_RUN, verdict
 from cosim.run.run_folder import claim, conclude
-from cosim.scenario.law_factory import require_builtin_law
+from cosim.scenario.law_factory import require_no_fmus
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.master import Master, Observer
@@ -68,7 +68,7 @@ _WITHOUT_ESTIMATES = _WITHOUT_WEIGHT | {
 
 def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile: ProfileName = "ardusub") -> Scenario:
     """Return a scenario as the companion flies it: a step is a control period, and the autopilot reports the state."""
-    require_builtin_law(scenario)
+    require_no_fmus(scenario, "a real vehicle")
     for key, value in (("failures", scenario.failures), ("record.lyapunov", scenario.record.lyapunov)):
         if value:
             raise RunError(f"{scenario.name}: {key} is set, expected none with a real vehicle")

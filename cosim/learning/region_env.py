@@ -27,7 +27,7 @@ from cosim.learning.control_period import (
     begin,
     call_each,
 )
-from cosim.scenario.law_factory import law_of, require_builtin_law
+from cosim.scenario.law_factory import law_of, require_no_fmus
 from cosim.scenario.scenario import Scenario, load_scenario
 from cosim.scenario.true_vehicle import start_values
 from cosim.simulation.bindings import BoundLaw, bind_rules
@@ -48,7 +48,7 @@ class _Setup:
     ) -> None:
         base = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
         require_fused(base, "learning")
-        require_builtin_law(base)
+        require_no_fmus(base, "learning")
         self.variation = Variation(base, list(vary))
         self.low, self.high = np.array(list(vary.values()), dtype=float).reshape(-1, 2).T
         self.scale = greatest_wrench(base.vehicle)  # N, N m

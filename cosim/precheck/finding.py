@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+Topic = Literal["vehicle", "law", "regions", "thrust", "components"]
 Status = Literal["holds", "fails", "note"]
 Number = float | bool | str | None
 
@@ -14,7 +15,7 @@ Number = float | bool | str | None
 class Finding:
     """A checked condition, its status, and advice on how to fulfil it."""
 
-    topic: Literal["vehicle", "law", "regions", "thrust"]
+    topic: Topic
     name: str  # such as "Property 1" or "(38)"
     status: Status  # a note is information, not a failure
     text: str  # result, with numbers

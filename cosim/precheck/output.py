@@ -8,7 +8,7 @@ import textwrap
 from cosim.io.strict_json import json_text
 from cosim.precheck.precheck import Check
 
-_TOPICS = {"vehicle": "Vehicle", "law": "Law", "regions": "Regions", "thrust": "Thrusters"}
+_TOPICS = {"vehicle": "Vehicle", "law": "Law", "regions": "Regions", "thrust": "Thrusters", "components": "FMUs"}
 _WIDTH = 110
 
 
@@ -16,10 +16,10 @@ def check_text(check: Check) -> str:
     """Format a check as text: findings by topic, then the verdict."""
     lines = [f"{check.title} ({check.scenario}; {check.vehicle}, {check.law} law)"]
     for topic, heading in _TOPICS.items():
-        lines += ["", heading]
-        for finding in check.findings:
-            if finding.topic == topic:
-                lines += _wrapped(f"  {finding.status:5}  {finding.name}: ", finding.text, 9)
+        findings = [finding for finding in check.findings if finding.topic == topic]
+        lines += ["", heading] if findings else []
+        for finding in findings:
+            lines += _wrapped(f"  {finding.status:5}  {finding.name}: ", finding.text, 9)
     if check.holds:
         return "\n".join([*lines, "", "Verdict: nothing is wrong with this scenario."])
     lines += ["", f"Verdict: {len(check.failed)} of {len(check.findings)} fail. What to change:"]

@@ -8,7 +8,7 @@ from pathlib import Path
 from cosim.precheck.angles import angle_findings
 from cosim.precheck.feasibility import region_findings
 from cosim.precheck.finding import Finding
-from cosim.precheck.own_fmu import fmu_findings
+from cosim.precheck.own_fmu import component_findings, law_fmu_findings
 from cosim.precheck.stability import gain_findings, start_weights, vehicle_findings
 from cosim.precheck.thrust import initial_force_finding, thrust_findings
 from cosim.scenario.scenario import Scenario, to_scenario
@@ -78,8 +78,9 @@ def check_scenario(scenario: Scenario | str | Path) -> Check:
         weights = start_weights(scenario)
         findings += [*gain_findings(scenario, weights), initial_force_finding(scenario, weights)]
     elif scenario.law.fmu:
-        findings += fmu_findings(scenario, scenario.law.fmu)
+        findings += law_fmu_findings(scenario, scenario.law.fmu)
     else:
         text = f"(31)-(45) hold for the paper's law alone: not checked for {scenario.law.name}."
         findings.append(Finding("law", "(38), (45)", "note", text))
+    findings += component_findings(scenario)
     return Check(scenario.name, scenario.title, scenario.law.name, scenario.vehicle.name, tuple(findings))

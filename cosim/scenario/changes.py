@@ -16,7 +16,7 @@ from plant_fmu.vehicle import Vehicle
 
 # keys that no title lists: texts, recording, reporting and commands; seeds, and the text of a named file
 _UNLISTED_TABLES = ("title", "changed", "compare", "intersection", "record", "commands")
-_UNLISTED_KEYS = ("sensing.seed", "plant.parameters.seed", "arbiter.text", "law.digest")
+_UNLISTED_KEYS = ("sensing.seed", "plant.parameters.seed", "arbiter.text")
 # keys of the computation, which a title lists behind those of the task
 _COMPUTATION = ("time.", "plant.fmi", "plant.substep", "arbiter.engine", "arbiter.points", "master.")
 _MAX_LISTED = 3  # changes that a title spells out
@@ -76,17 +76,22 @@ def differing_keys(before: Any, after: Any, path: str = "") -> Iterator[str]:
 
 def join_keys(before: Sequence[str], more: Iterable[str]) -> tuple[str, ...]:
     """Join two lists of keys, each key once, without those that no title lists."""
-    varied = (key for key in more if key.partition(".")[0] not in _UNLISTED_TABLES and key not in _UNLISTED_KEYS)
+    varied = (
+        key for key in more
+        if key.partition(".")[0] not in _UNLISTED_TABLES and key not in _UNLISTED_KEYS and not key.endswith(".digest")
+    )  # fmt: skip
     return tuple(dict.fromkeys([*before, *varied]))
 
 
 def value_at(table: dict[str, Any], key: str, vehicle: Vehicle) -> Any:
     """Return the value of a scenario's key."""
     if key.startswith(PARAMETERS):
-        name, known = key.removeprefix(PARAMETERS), known_parameters(vehicle)
+        name, given = key.removeprefix(PARAMETERS), table["plant"]["parameters"]
+        known = given if table["plant"]["file"] else known_parameters(vehicle) | given
         if name not in known:
-            raise ScenarioError(f"key {key!r} is no parameter of the vehicle's FMU; {hint(name, known)}")
-        return table["plant"]["parameters"].get(name, known[name])
+            whose = "given for plant.file" if table["plant"]["file"] else "of the vehicle's FMU"
+            raise ScenarioError(f"key {key!r} is no parameter {whose}; {hint(name, known)}")
+        return known[name]
     container, last = locate_key(table, key)
     return container[last]
 

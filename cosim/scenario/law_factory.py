@@ -38,6 +38,16 @@ def require_builtin_law(scenario: Scenario) -> None:
         )
 
 
+def require_no_fmus(scenario: Scenario, what: str) -> None:
+    """Raise `RunError` if law or plant of a scenario is of the user's, or FMUs are beside it; `what` needs its own."""
+    require_builtin_law(scenario)
+    if scenario.plant_fmu:
+        raise RunError(f"plant.file is {scenario.plant_fmu.file.name!r}, expected none for {what}")
+    if scenario.components:
+        names = ", ".join(fmu.name for fmu in scenario.components)
+        raise RunError(f"components are given ({names}), expected none for {what}")
+
+
 def with_custom_law(law: Law, scenario: Scenario) -> Scenario:
     """Return a scenario with a custom law."""
     if getattr(law, "output", None) not in get_args(Output) or not callable(getattr(law, "step", None)):

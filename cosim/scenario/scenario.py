@@ -17,11 +17,12 @@ from controller.regions import Region
 from controller.regions.region_set import shape_center, shape_entry
 from controller.regions.shape import Shape
 from controller.restoring import parameters
-from cosim.errors import RunError, ScenarioError
+from cosim.errors import ScenarioError
 from cosim.scenario.arbiter_rules import ArbiterRules, check_rules, read_rules
 from cosim.scenario.changes import changed_keys, differing_keys, join_keys, shown_title, with_values
 from cosim.scenario.criteria import PAPER, CriterionSetup, check_criteria, check_criteria_of_regions, fill_criteria
 from cosim.scenario.crossing_costs import with_crossing_costs
+from cosim.scenario.fmu_tables import UserFmu
 from cosim.scenario.goal_mission import Mission, make_mission
 from cosim.scenario.keys import comments, hint_of_key, without_defaults
 from cosim.scenario.region_tables import PAPER_CRITERIA, SecondaryRegion, Vector3
@@ -45,29 +46,30 @@ from cosim.scenario.tables import (
 from cosim.scenario.toml_file import flatten, list_scenarios, override, read_table, rename_former_keys, set_key
 from cosim.scenario.toml_text import scenario_text
 from cosim.scenario.validation import (
-    check_digest,
+    check_components,
     check_goal,
     check_grids,
     check_intersection,
     check_law,
     check_mission,
+    check_plant,
     check_regions,
     check_tables,
     expand_parameters,
     obstacle_slots,
     steps_per_period,
+    with_digests,
 )
 from plant_fmu.errors import PlantFmuError
 from plant_fmu.toml_tables import decode, hint, require_bounded
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
-__all__ = ["VEHICLE_COPY", "Limit", "Scenario", "Time", "load_scenario"]
+__all__ = ["Limit", "Scenario", "Time", "load_scenario"]
 
 _AS_READ = (  # fields of a scenario that are those of its file
-    "time", "plant", "initial", "arbiter", "limit", "actuation", "sensing", "failures", "outages", "master", "record",
+    "time", "initial", "arbiter", "limit", "actuation", "sensing", "failures", "outages", "master", "record",
     "commands", "report_failures", "compare",
 )  # fmt: skip
-VEHICLE_COPY = "vehicle.toml"  # name in a run folder of a vehicle that is not shipped
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +93,8 @@ class Scenario:
     arbiter_every: int  # number of plant steps between two evaluations of the arbiter
     plant: PlantSetup
     initial: Initial
+    plant_fmu: UserFmu | None  # FMU of the user's that is the plant
+    components: tuple[UserFmu, ...]  # FMUs beside the plant
     law: LawSetup
     arbiter: ArbiterSetup
     criteria: tuple[CriterionSetup, ...]  # criteria by descending priority
@@ -291,44 +295,6 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = (), impor
         raise ScenarioError(f"{text}: {error}") from error
 
 
-def table_of_files(scenario: Scenario) -> dict[str, Any]:
-    """Return the table of a scenario, with the names of the copies in `files_of`."""
-    law = scenario.table["law"] | ({"file": scenario.law.name} if scenario.law.fmu else {})
-    copies, regions = _shape_copies(scenario), scenario.table["regions"]
-    regions = tuple(region | {"shape": _with_copy(region["shape"], copies)} for region in regions)
-    table = scenario.table | {"law": law, "goal": _with_copy(scenario.table["goal"], copies), "regions": regions}
-    return table | ({"vehicle": VEHICLE_COPY} if scenario.vehicle_file else {})
-
-
-def _with_copy(shape: dict[str, Any], copies: dict[str, str]) -> dict[str, Any]:
-    """Return a shape's table with the name of the copy of its file."""
-    return shape | {"file": copies[shape["file"]]} if "file" in shape else shape
-
-
-def _shape_copies(scenario: Scenario) -> dict[str, str]:
-    """Return the names of the copies of the shapes' files, which differ."""
-    shapes = [scenario.goal, *(secondary.region.shape for secondary in scenario.regions)]
-    files = dict.fromkeys(shape.file for shape in shapes if hasattr(shape, "file"))
-    taken, copies = {"scenario.toml", VEHICLE_COPY, scenario.law.name}, {}
-    for file in files:
-        path = Path(file)
-        names = (path.name, *(f"{path.stem}-{i}{path.suffix}" for i in range(2, len(files) + 3)))
-        copies[file] = next(name for name in names if name not in taken)
-        taken.add(copies[file])
-    return copies
-
-
-def files_of(scenario: Scenario) -> dict[str, bytes]:
-    """Return the files that repeat a scenario, by name: its own, and copies of those that it names."""
-    sources = {VEHICLE_COPY: scenario.vehicle_file, scenario.law.name: scenario.law.fmu and scenario.law.fmu.file}
-    sources |= {name: Path(file) for file, name in _shape_copies(scenario).items()}
-    try:
-        copies = {name: source.read_bytes() for name, source in sources.items() if source}
-    except OSError as error:
-        raise RunError(f"{error.filename}: {error.strerror or error}") from error
-    return {"scenario.toml": scenario_text(table_of_files(scenario), {}).encode()} | copies
-
-
 def to_scenario(scenario: Scenario | str | Path) -> Scenario:
     """Return a scenario itself, or load it by its name or file."""
     return scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
@@ -353,22 +319,33 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
 def read_tables(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> File:
     """Check each table of a scenario's file, and fill in the defaults."""
     table = with_quaternions(rename_former_keys(table))
-    for key, names in (("plant", ("parameters",)), ("law", ("inputs", "outputs", "parameters"))):
-        if isinstance(entry := table.get(key), dict):
-            flat = {name: flatten(entry[name]) for name in names if isinstance(entry.get(name), dict)}
-            table = table | {key: entry | flat}
+    for key in ("plant", "law"):
+        table = table | ({key: _with_flat_maps(table[key])} if key in table else {})
+    if isinstance(components := table.get("components"), list | tuple):
+        table = table | {"components": [_with_flat_maps(entry) for entry in components]}
     for key in table.keys() - File.__struct_fields__:
         raise ScenarioError(f"{key}: unknown key; {hint_of_key(key, table.get('vehicle'))}")
     file: File = decode(table, File)
-    parameters = expand_parameters(file.plant.parameters, vehicle or _vehicle_of(file))
+    parameters = file.plant.parameters
+    if not file.plant.file:
+        parameters = expand_parameters(parameters, vehicle or _vehicle_of(file))
+    file = with_digests(file)
     return msgspec.structs.replace(
         file,
         title=file.title or name,
         plant=msgspec.structs.replace(file.plant, parameters=parameters),
-        law=msgspec.structs.replace(file.law, gains=file.law.setup.gains._asdict(), digest=check_digest(file.law)),
+        law=msgspec.structs.replace(file.law, gains=file.law.setup.gains._asdict()),
         criteria=fill_criteria(file.criteria),
         arbiter=read_rules(file.arbiter),
     )
+
+
+def _with_flat_maps(entry: Any) -> Any:
+    """Return the table of an FMU with the names of its variables as keys, which TOML nests at their dots."""
+    if not isinstance(entry, dict):
+        return entry
+    maps = ("inputs", "outputs", "parameters", "initial")
+    return entry | {name: flatten(entry[name]) for name in maps if isinstance(entry.get(name), dict)}
 
 
 def _vehicle_of(file: File) -> Vehicle:
@@ -391,16 +368,20 @@ def make_scenario(file: File, name: str, vehicle: Vehicle | None = None) -> Scen
     check_tables(file, regions, vehicle)
     mission = make_mission(goal, shape_center(goal), motion, regions)
     check_mission(mission, law)
+    own_plant, components = check_plant(file), check_components(file.components, file.plant.fmi)
     regions = with_crossing_costs(regions, tuple(c.name for c in criteria), rules, file.initial.position[2])
     names = tuple(regions[i].region.name for i in overlapping)
     return Scenario(
         name=name,
         vehicle=vehicle,
         vehicle_file=Path(file.vehicle) if file.vehicle.endswith(".toml") else None,
+        plant=msgspec.structs.replace(file.plant, parameters={}) if own_plant else file.plant,
         **{name: getattr(file, name) for name in _AS_READ},
         steps=steps_per_period("time.duration", time.duration, time.step),
         control_every=steps_per_period("time.control", time.control, time.step),
         arbiter_every=steps_per_period("time.arbiter", time.arbiter, time.step),
+        plant_fmu=own_plant,
+        components=components,
         law=law,
         criteria=criteria,
         rules=rules,

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import msgspec
 
 from controller import LAWS
+from cosim.scenario.fmu_tables import ComponentEntry, FmuTable, UserFmu
 from cosim.scenario.region_tables import PAPER_CRITERIA, CriterionEntry, RegionEntry, Vector3, Vector4, Vector6
 from plant_fmu.toml_tables import Finite, NonNegative, Positive, Table, Unlimited, hint, key, require
 
@@ -30,7 +31,7 @@ def _require_unit(name: str, quaternion: Vector4) -> None:
     require(ok, name, quaternion, "four numbers of length 1")
 
 
-class PlantSetup(Table, frozen=True):
+class PlantSetup(FmuTable, frozen=True):
     """Setup of the plant."""
 
     fmi: Annotated[Literal[2, 3], key("FMI version of the plant, 2 or 3")] = 3
@@ -40,6 +41,15 @@ class PlantSetup(Table, frozen=True):
         dict[str, bool | Finite],
         key("parameters of the FMU over those of the vehicle, such as `mass` or `r_G.z`", more="; not for the law"),
     ] = msgspec.field(default_factory=dict)
+    initial: Annotated[
+        dict[str, str],
+        key("part of the start pose or velocity for its parameters and start values", default="those of equal names"),
+    ] = msgspec.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("inputs", "outputs", "initial", "digest"):
+            require(bool(self.file or not getattr(self, name)), name, repr(getattr(self, name)), "none without file")
 
 
 class Initial(Table, frozen=True):
@@ -232,17 +242,6 @@ class Time(Table, frozen=True):
             msgspec.structs.force_setattr(self, name, getattr(self, name) or self.step)
 
 
-class UserFmu(NamedTuple):
-    """A co-simulation FMU of the user's, with the map between its variables and the signals of a run."""
-
-    key: str  # table of the scenario that names it, such as "law"
-    file: Path
-    inputs: dict[str, str]  # signal of each of its inputs; inputs that are not named have that of their own name
-    outputs: dict[str, str]  # likewise what each of its outputs sets
-    parameters: dict[str, float | bool | str]
-    timeout: float  # s of the wall clock
-
-
 class NoGains(NamedTuple):
     """Gains of a custom law in a scenario: none."""
 
@@ -262,7 +261,7 @@ class LawSetup:
         return isinstance(self.gains, NoGains)
 
 
-class LawEntry(Table, frozen=True):
+class LawEntry(FmuTable, frozen=True):
     """Name and gains of the law; gains that are not given are the law's own."""
 
     name: Annotated[
@@ -284,24 +283,15 @@ class LawEntry(Table, frozen=True):
             default="the law's own",
         ),
     ] = msgspec.field(default_factory=dict)
-    file: Annotated[str, key("FMU [of one's own](howto/your-fmu.md), beside the file that names it")] = ""
-    inputs: Annotated[dict[str, str], key("signal for each of its inputs", default="those of equal names")] = (
-        msgspec.field(default_factory=dict)
-    )
-    outputs: Annotated[dict[str, str], key("what each of its outputs sets", default="those of equal names")] = (
-        msgspec.field(default_factory=dict)
-    )
     parameters: Annotated[dict[str, float | bool | str], key("values of its parameters", default="its own")] = (
         msgspec.field(default_factory=dict)
     )
-    timeout: Annotated[Positive, key("a step of it that takes longer ends the process", "s of the wall clock")] = 10.0
-    digest: Annotated[str, key("its SHA-256", more="; runs write it into their folder", default="not checked")] = ""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         _require_unit("desired_quaternion", self.desired_quaternion)
         if self.file:
             file = Path(self.file)
-            require(file.suffix == ".fmu", "file", repr(file.name), "a name that ends in .fmu")
             require(self.name in ("ismail_dunnigan", file.name), "name", repr(self.name), "none beside file")
             msgspec.structs.force_setattr(self, "name", file.name)
         for field in ("inputs", "outputs", "parameters", "digest"):
@@ -325,8 +315,8 @@ class LawEntry(Table, frozen=True):
     def setup(self) -> LawSetup:
         """The law with all of its gains."""
         gains = NoGains() if self.is_custom else LAWS[self.name].gains_type(**self.gains)
-        fmu = UserFmu("law", Path(self.file), self.inputs, self.outputs, self.parameters, self.timeout)
-        return LawSetup(self.name, self.desired_quaternion, gains, fmu if self.file else None)
+        fmu = self.fmu("law", self.parameters) if self.file else None
+        return LawSetup(self.name, self.desired_quaternion, gains, fmu)
 
     @property
     def is_custom(self) -> bool:
@@ -387,6 +377,9 @@ class File(Table, frozen=True):
     outages: Annotated[
         tuple[Outage, ...],
         key("times in which a sensor gives no samples; where sensing is through `sensors`", default="none"),
+    ] = ()
+    components: Annotated[
+        tuple[ComponentEntry, ...], key("FMUs [beside the plant](howto/your-fmu.md#4-beside-the-plant)", default="none")
     ] = ()
     master: MasterSetup = MasterSetup()
     record: RecordSetup = RecordSetup()

@@ -72,8 +72,9 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
         vehicle = table.get("vehicle")
         if isinstance(vehicle, str) and vehicle.endswith(".toml"):  # relative to the file that names it
             table["vehicle"] = str(folder / vehicle)
-        shapes = (region.get("shape") for region in _tables(table, "regions"))
-        for holder in (table.get("arbiter"), table.get("law"), table.get("goal"), *shapes):
+        holders = [table.get(name) for name in ("arbiter", "law", "plant", "goal")]
+        shapes = [region.get("shape") for region in _tables(table, "regions")]
+        for holder in (*holders, *_tables(table, "components"), *shapes):
             if isinstance(holder, dict) and not holder.get("text"):
                 file = holder.get("file")
                 if file and isinstance(file, str):  # likewise
@@ -93,9 +94,11 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
         law = table.get("law")
         if isinstance(law, dict) and ("file" in law or "name" in law):
             _name_law(below, law.get("name"), law.get("file"))
-        arbiter = table.get("arbiter")
+        arbiter, plant = table.get("arbiter"), table.get("plant")
         if isinstance(arbiter, dict) and "file" in arbiter:
             _name_rules(below)
+        if isinstance(plant, dict) and "file" in plant:  # nothing of another plant
+            below.pop("plant", None)
         if "title" in table:  # a new title covers all changes of the base
             below.pop("changed", None)
         over, table = table, _merge(below, table)
@@ -209,6 +212,8 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
         _name_law(table, None, value)
     if key == "arbiter.file":
         _name_rules(table)
+    if key == "plant.file":
+        table["plant"] = {}
     node: Any = table
     for part in path:
         if isinstance(node, list):

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from controller import LAWS
@@ -20,9 +21,10 @@ from controller.regions import Mesh, Points, Region, Sphere
 from controller.regions.region_set import of_attitude
 from controller.regions.shape import Shape
 from cosim.errors import ScenarioError
+from cosim.scenario.fmu_tables import ComponentEntry, FmuTable, UserFmu
 from cosim.scenario.goal_mission import GoalMotion, Mission
 from cosim.scenario.region_tables import PARKED_POSITION, AnyShape, RegionEntry, SecondaryRegion
-from cosim.scenario.tables import Commands, File, LawEntry, LawSetup, Limit
+from cosim.scenario.tables import Commands, File, LawEntry, LawSetup, Limit, PlantSetup
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.toml_tables import decode, hint
 from plant_fmu.variables import variables
@@ -202,21 +204,63 @@ def check_mission(mission: Mission, law: LawSetup) -> None:
         raise ScenarioError(f"goal: speeds for law {law.name}, expected none, or one of the laws {', '.join(takers)}")
 
 
-def check_digest(entry: LawEntry) -> str:
-    """Return the digest of a law's FMU, which has to be the one that the table states; "" without an FMU."""
+def with_digests(file: File) -> File:
+    """Return the file with the digests of all FMUs of the user's, which have to be those that it states."""
+    fill = msgspec.structs.replace
+    return fill(
+        file,
+        law=fill(file.law, digest=_check_digest("law", file.law)),
+        plant=fill(file.plant, digest=_check_digest("plant", file.plant)),
+        components=tuple(
+            fill(entry, digest=_check_digest(f"components.{entry.name}", entry)) for entry in file.components
+        ),
+    )
+
+
+def _check_digest(path: str, entry: FmuTable) -> str:
+    """Return the digest of an FMU, which has to be the one that its table states; "" without an FMU."""
     if not entry.file:
         return ""
     try:
-        path = Path(entry.file)
-        if not path.is_file():
+        fmu = Path(entry.file)
+        if not fmu.is_file():
             raise FileNotFoundError(errno.ENOENT, "No such file")
-        status = path.stat()
-        digest = _digest(path, status.st_mtime_ns, status.st_size)
+        status = fmu.stat()
+        digest = _digest(fmu, status.st_mtime_ns, status.st_size)
     except OSError as error:
-        raise ScenarioError(f"law.file: {entry.file}: {error.strerror or error}") from error
+        raise ScenarioError(f"{path}.file: {entry.file}: {error.strerror or error}") from error
     if entry.digest not in ("", digest):
-        raise ScenarioError(f"law.file: {path.name} has the digest {digest[:12]}..., expected {entry.digest[:12]}...")
+        raise ScenarioError(f"{path}.file: {fmu.name} has the digest {digest[:12]}..., expected {entry.digest[:12]}...")
     return digest
+
+
+def check_components(entries: tuple[ComponentEntry, ...], fmi: int) -> tuple[UserFmu, ...]:
+    """Check the FMUs beside the plant; return them."""
+    names = [entry.name for entry in entries]
+    for i, name in enumerate(names):
+        _require(names.count(name) == 1, f"components[{i}].name", f"{name!r}, used twice", "a name of its own")
+    _require(not entries or fmi == 3, "plant.fmi", fmi, "3 with components")
+    return tuple(entry.fmu(f"components.{entry.name}", entry.parameters) for entry in entries)
+
+
+def check_plant(file: File) -> UserFmu | None:
+    """Check that an FMU of the user's needs nothing that the vehicle's own plant has; return it."""
+    plant, default = file.plant, PlantSetup()
+    if not plant.file:
+        return None
+    of_vehicle = "its default with plant.file: it is of the vehicle's own FMU"
+    for name, key, received, fits in (
+        ("plant", "fmi", plant.fmi, plant.fmi == default.fmi),
+        ("plant", "current", plant.current, plant.current == default.current),
+        ("plant", "substep", plant.substep, plant.substep == default.substep),
+        ("limit", "force", file.limit.force, file.limit.force == Limit().force),
+        ("limit", "time_constant", file.limit.time_constant, file.limit.time_constant == 0.0),
+        ("sensing", "through", repr(file.sensing.through), file.sensing.through == "state"),
+        ("record", "lyapunov", "true", not file.record.lyapunov),
+    ):
+        _require(fits, f"{name}.{key}", received, of_vehicle)
+    _require(not file.failures, "failures", "given", f"none with plant.file: {Path(plant.file).name} knows none")
+    return plant.fmu("plant", dict(plant.parameters), plant.initial)
 
 
 @functools.lru_cache(maxsize=8)

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from controller import LAWS, Law
+from controller import LAWS
 from controller.law import Diagnostic
 from controller.regions.region_set import of_attitude
+from cosim.errors import ScenarioError
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import MODES
+from cosim.simulation.component_map import component_channels, component_columns
 from cosim.simulation.lyapunov_signals import lyapunov_columns
 from cosim.simulation.signals import Column
-from cosim.simulation.stepped_plant import SteppedPlant, vehicle_channels
+from cosim.simulation.stepped_plant import SteppedPlant, VehicleChannels, vehicle_channels
 from plant_fmu.running import Channel
 
 _FORCE_UNITS = ("N",) * 3 + ("N.m",) * 3
 
 
-def columns_of(scenario: Scenario, plant: SteppedPlant, law: Law) -> list[Column]:
-    """Return the columns of a run."""
-    channels = (plant.outputs.channels, plant.flags.channels, plant.inputs.channels)
-    return columns_of_channels(scenario, *channels, law.diagnostics)
+def channels_of_run(scenario: Scenario, plant: SteppedPlant | None = None) -> VehicleChannels:
+    """Return the plant's channels in the record: all of a caller's plant, else the inputs that components set too."""
+    if plant is not None:
+        return VehicleChannels(plant.outputs.channels, plant.flags.channels, plant.inputs.channels)
+    outputs, flags, inputs = vehicle_channels(scenario.vehicle)
+    return VehicleChannels(outputs, flags, (*inputs, *component_channels(scenario)))
 
 
 def column_names(scenario: Scenario) -> list[str]:
@@ -29,9 +33,9 @@ def column_names(scenario: Scenario) -> list[str]:
 
 
 def columns_without_plant(scenario: Scenario) -> list[Column]:
-    """Return the columns of a run as `columns_of` does, from the vehicle's table of variables and a built-in law."""
+    """Return the columns of a run from the vehicle's table of variables and a built-in law."""
     law = LAWS.get(scenario.law.name)
-    return columns_of_channels(scenario, *vehicle_channels(scenario.vehicle), law.diagnostics if law else ())
+    return columns_of_channels(scenario, *channels_of_run(scenario), law.diagnostics if law else ())
 
 
 def columns_of_channels(
@@ -43,7 +47,7 @@ def columns_of_channels(
 ) -> list[Column]:
     """Return the columns of a run that exchanges some channels with its plant."""
     regions = [("goal", scenario.goal), *((r.region.name, r.region.shape) for r in scenario.regions)]
-    return [
+    columns = [
         Column("time", "s", "Simulated time at the beginning of the step"),
         *_as_columns(outputs),
         *_as_columns(flags),
@@ -77,6 +81,14 @@ def columns_of_channels(
         *lyapunov_columns(scenario),
         *_arbiter_input_columns(scenario),
     ]
+    names, beside = {column.name for column in columns}, component_columns(scenario)
+    for column in beside:
+        if column.name in names:
+            name = column.name.partition(".")[0]
+            raise ScenarioError(
+                f"components.{name}.name is {name!r}, but {column.name!r} is a column already, expected another name"
+            )
+    return [*columns, *beside]
 
 
 def _arbiter_input_columns(scenario: Scenario) -> Iterator[Column]:

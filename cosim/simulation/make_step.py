@@ -19,6 +19,7 @@ from cosim.scenario.sensor_suite import outage_schedule, scenario_sensors, senso
 from cosim.simulation.actuation_limits import failure_stages
 from cosim.simulation.bindings import is_compiled, outputs_of
 from cosim.simulation.columns import columns_of_channels
+from cosim.simulation.component_map import component_columns
 from cosim.simulation.environment import pack_target
 from cosim.simulation.signals import Signals
 from cosim.step.arbiter_inputs import ArbiterSignals, empty_signals, empty_state, pack_inputs
@@ -28,6 +29,7 @@ from cosim.step.step_model import N_CALLS, Array, Integers, StepData, StepModel
 from plant_fmu.running.channels import Channel
 
 STREAM = 1  # second part of the seed, as in scored scenes: a scene and a scenario of one seed have the same noise
+_FORCES = ("thruster_force[", "actuator.wrench.", "actuation.")  # outputs of the end of a step begin with one
 _ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
 NO_CLOCK: Integers = np.empty(0, np.int64)
 _MOTION = (
@@ -183,7 +185,7 @@ def make_data(scenario: Scenario, model: StepModel, law: Law, signals: Signals, 
     def view(first: str, size: int) -> Array:
         return signals.view(first, size) if size and first in signals else np.zeros(size)
 
-    first_force = next(i for i, name in enumerate(outputs) if name.startswith(("thruster_force[", "actuator.wrench.")))
+    first_force = next(i for i, name in enumerate(outputs) if name.startswith(_FORCES))
     health = np.ones(m)
     # law and arbiter get arrays of their own, also where these equal the true ones
     state = VehicleState(view("sensed.x", 3), view("sensed.e0", 4), view("sensed.u", 6), health,
@@ -197,6 +199,7 @@ def make_data(scenario: Scenario, model: StepModel, law: Law, signals: Signals, 
     own, commands = min(len(inputs), m + 6), scenario.commands.enabled
     regions = pack([secondary.region for secondary in scenario.regions])
     out = outputs_of(law)
+    of_components, n_components = component_columns(scenario), len(scenario.components)
     return StepData(
         row=signals.row,
         now=signals.row[:1],
@@ -238,6 +241,10 @@ def make_data(scenario: Scenario, model: StepModel, law: Law, signals: Signals, 
         by_criterion=view(f"weight.{scenario.criterion_names[0]}", c) if c else np.zeros(0),
         weights=np.zeros(n),
         calls=np.zeros(N_CALLS, np.int64),
+        components=np.zeros(2 * n_components, np.int64),
+        exchanges=np.zeros(2 * (n_components + 1) if model.jacobi else 0, np.int64),
+        component_outputs=view(of_components[0].name if of_components else "", len(of_components)),
+        component_results=np.zeros(len(of_components)),
         law=out,
         expected=np.full(6, np.nan),
         estimate=view("estimate.phi1", 4),

@@ -21,10 +21,11 @@ from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import start_values
 from cosim.simulation.actuation_limits import ActuationLimits
 from cosim.simulation.bindings import BoundLaw, bind_arbiter
-from cosim.simulation.columns import columns_of
+from cosim.simulation.columns import channels_of_run, columns_of_channels
 from cosim.simulation.commands.command_handler import CommandHandler
 from cosim.simulation.commands.commands import Command
 from cosim.simulation.commands.sources import CommandSource
+from cosim.simulation.components import Components
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.fmu_law import FmuLaw, make_law
 from cosim.simulation.lyapunov_signals import LyapunovSignals
@@ -128,7 +129,10 @@ class Master:
             self._open.callback(self.plant.close)
             self.plant.set(start_values(scenario))
             self.plant.initialize()
-            self.signals = Signals(columns_of(scenario, self.plant, self.law))
+            self._channels = channels_of_run(scenario, plant)
+            self.signals = Signals(columns_of_channels(scenario, *self._channels, self.law.diagnostics))
+            self._components = Components(scenario, self.plant)
+            self._open.callback(self._components.close)
             self._bind(own_plant=plant is None)
         except BaseException:
             self.close()
@@ -136,14 +140,13 @@ class Master:
 
     def _bind(self, own_plant: bool) -> None:
         """Bind plant, law, arbiter and commands to the arrays of a step."""
-        # constants, and state and signals that are views of the row
         s, scenario = self.signals, self.scenario
-        inputs, outputs, flags = (c.names for c in (self.plant.inputs, self.plant.outputs, self.plant.flags))
+        outputs, flags, inputs = ([channel.name for channel in channels] for channels in self._channels)
         self._noise = NoiseSource(scenario, 2 + _BLOCK // scenario.control_every)
         self.model = make_model(scenario, self.law, for_record=True)
         self.data = make_data(scenario, self.model, self.law, s, inputs, outputs, self._noise.values, flags)
-        # what a step calls: the plant, the law, the arbiter
-        self._plant = BoundPlant(scenario, self.plant, self.data, native=own_plant)
+        self._plant = BoundPlant(scenario, self.plant, self.data, own_plant, inputs)
+        self._components.bind(scenario, self.model, self.data, s, inputs, self._plant.calls.native.inputs)
         self.true_state, self.state = self.data.true_state, self.data.state
         self.environment = RegionEnvironment(scenario, self.data)
         self._span = np.zeros(3, np.int64)
@@ -151,11 +154,11 @@ class Master:
         arguments = self.model, self.data, self._plant.calls
         block = *arguments, self._span, self._rows
         self._bound_law = BoundLaw(self.law, self.model, self.data, s)
-        self._parts: list[_Raising] = [self._bound_law, bind_arbiter(self.arbiter, self.data), self._plant]
+        arbiter = bind_arbiter(self.arbiter, self.data)
+        self._parts: list[_Raising] = [self._bound_law, arbiter, self._plant, self._components]
         self._advance_one = BoundCall(advance, (*arguments, self._span, self._rows[:0]))
         self._advance_block = BoundCall(advance, block)
         self._show_start = BoundCall(show_start, arguments)
-        # what a step does not do itself: the Lyapunov function after it, commands within it
         self._lyapunov: LyapunovSignals | None = None
         if scenario.record.lyapunov:
             self._lyapunov = LyapunovSignals(scenario, self.data, s.view("lyapunov.printed", 4))

@@ -13,11 +13,14 @@ from controller import Law
 from controller.compiling.function import load_functions
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.bindings import is_compiled, law_arguments
+from cosim.simulation.fmu_plant import FmuPlant
 from cosim.simulation.make_step import exchanged_variables, make_data, make_model, step_signals
 from cosim.step.one_step import advance, show_start
 from cosim.step.plant_calls import PlantCalls
 from plant_fmu import Plant
+from plant_fmu.build import cached_fmu
 from plant_fmu.running.native import Native
+from plant_fmu.vehicle_component import make_vehicle_component
 
 INTEGERS, FLAT = np.zeros(1, np.int64), np.zeros(1)
 
@@ -35,10 +38,19 @@ def step_functions(scenario: Scenario, law: Law) -> list[tuple[Callable[..., Non
     return [*of_law, (advance, (model, data, calls, INTEGERS, np.zeros((0, 0)))), (show_start, (model, data, calls))]
 
 
-def make_plant(scenario: Scenario, law: Law) -> Plant:
-    """Make the vehicle's plant, and load the functions of a run meanwhile: the first time both are compiled."""
+def load_plant(scenario: Scenario) -> Plant | FmuPlant:
+    """Load the plant: an FMU of the user's, or that of the vehicle, with inputs for components if there are any."""
+    if scenario.plant_fmu:
+        return FmuPlant(scenario)
+    if scenario.components:
+        return Plant(cached_fmu(make_vehicle_component(scenario.vehicle, coupled=True), scenario.plant.fmi))
+    return Plant(scenario.vehicle, scenario.plant.fmi)
+
+
+def make_plant(scenario: Scenario, law: Law) -> Plant | FmuPlant:
+    """Load the plant, and load the functions of a run meanwhile: the first time both are compiled."""
     with ThreadPoolExecutor(1) as pool:
-        plant = pool.submit(Plant, scenario.vehicle, scenario.plant.fmi)
+        plant = pool.submit(load_plant, scenario)
         try:
             load_functions(*step_functions(scenario, law))
         except Exception:

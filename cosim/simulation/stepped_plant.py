@@ -57,13 +57,18 @@ class SteppedPlant(Protocol):
 class BoundPlant:
     """Binds a plant to the arrays of a step: an FMU by its C functions, any other plant by Python functions."""
 
-    def __init__(self, scenario: Scenario, plant: SteppedPlant, data: StepData, native: bool) -> None:
+    def __init__(
+        self, scenario: Scenario, plant: SteppedPlant, data: StepData, native: bool, inputs: Sequence[str]
+    ) -> None:
         self._plant, self._step = plant, scenario.time.step
         self.native = native and isinstance(plant, Plant) and plant.fmi == 3
         self._calls: list[BoundCall] = []
         if self.native:
             assert isinstance(plant, Plant)
-            self.calls = plant_calls(scenario.vehicle, plant.native_channels(), plant.native)
+            own, sent = plant.native_channels(), plant.native(inputs, ())
+            if len(inputs) < len(plant.inputs):  # those that nothing sets keep their start values
+                own = own._replace(input_references=sent.input_references, inputs=sent.inputs)
+            self.calls = plant_calls(scenario.vehicle, own, plant.native)
         else:
             own = _buffers(plant.inputs.values, plant.outputs.values, np.zeros(len(plant.flags), np.bool_))
             self.calls = plant_calls(scenario.vehicle, own, lambda names, _: _buffers(np.full(len(names), np.nan)))

@@ -68,6 +68,10 @@ def scenario_to_fly(
     for key, value in (("commands.enabled", base.commands.enabled), ("record.lyapunov", base.record.lyapunov)):
         if value:
             raise RunError(f"{name_or_file}: {key} is true, expected false: the autopilot steers")
+    if base.plant_fmu:
+        raise RunError(
+            f"{name_or_file}: plant.file is set, expected none: an autopilot needs the sensors of the vehicle's own FMU"
+        )
     step = 1.0 / frame_rate
     for key, period in (("duration", base.time.duration), ("arbiter", base.time.arbiter), ("control", step)):
         changes.append(f"time.{key}={min(max(1, round(period * frame_rate)), MAX_STEPS) * step!r}")

@@ -7,8 +7,9 @@ from itertools import permutations
 from pathlib import Path
 
 from cosim.errors import RunError
-from cosim.scenario.law_factory import require_builtin_law
-from cosim.scenario.scenario import Scenario, files_of
+from cosim.scenario.file_copies import files_of
+from cosim.scenario.law_factory import require_no_fmus
+from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import start_values
 from cosim.ssp.arbiter import arbiter_component
 from cosim.ssp.controller import controller_component
@@ -108,7 +109,7 @@ def _fmu(component: Component, fmi: int, platforms: str) -> bytes:
 def _require(scenario: Scenario) -> None:
     """Raise a RunError for features that the FMUs of a system do not support."""
     streamed, engine = next((r.region.name for r in scenario.regions if r.streamed), ""), scenario.arbiter.engine
-    require_builtin_law(scenario)
+    require_no_fmus(scenario, "a system of FMUs")
     from_file = next((r.region.name for r in scenario.regions if hasattr(r.region.shape, "file")), "")
     for ok, key, received, expected in (
         (

@@ -1,9 +1,11 @@
-"""The step of an FMU of the user's: signals in, `doStep`, outputs out."""
+"""The step of an FMU of the user's, as the law, beside the plant or as the plant: signals in, `doStep`, outputs out."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
+
+import numpy as np
 
 from cosim.step.plant_calls import fmi_do_step, fmi_get, fmi_set
 from cosim.step.region_positions import RegionEvaluation
@@ -20,30 +22,28 @@ class FmuCalls(NamedTuple):
     period: float  # s, length of its steps
     sources: Integers  # (i,) index in `signals` of each input
     targets: Integers  # (o,) index among forces and estimate of each output
-    signals: Array  # measured motion (13), weights (n), values (n + 1), clearances (n + 1), gradients (3 n + 3), row
-    progress: (
-        Array  # (4,) steps done; 1 during a step; time of the run at its begin [s]; -1: it failed; n: output n - 1
-    )
-    # is not finite
+    signals: Array  # measured motion (13), weights (n), values (n + 1), clearances (n + 1), gradients (3 n + 3),
+    # row, latest outputs of components
+    progress: Array  # (4,) steps done; 1 during a step; time of the run at its begin [s]; -1: it failed; n: output
+    # n - 1 is not finite
+
+
+class ComponentCalls(NamedTuple):
+    """An FMU of the user's beside the plant, and what it exchanges."""
+
+    fmu: FmuCalls  # all its outputs; targets (o,): 1 for each that is connected, which has to be finite
+    first: int  # index of its first output in `StepData.component_results`
+    senders: Integers  # (c,) index among its outputs of each that an input of the plant receives
+    receivers: Integers  # (c,) index of that input
+    plant_inputs: Array  # (p,) inputs of the plant
 
 
 def call_law(fmu: FmuCalls, model: StepModel, data: StepData, forces: Array) -> None:
     """Let an FMU compute the forces [N] of the coming control period."""
-    collect_signals(fmu.signals, model, data)
-    native, progress, n = fmu.native, fmu.progress, forces.size
-    for i in range(fmu.sources.size):
-        native.inputs[i] = fmu.signals[fmu.sources[i]]
-    progress[NOW] = data.now
-    progress[BUSY] = 1.0
-    ok = False
-    if fmi_set(native) and fmi_do_step(native, progress[STEPS] * fmu.period, fmu.period) and fmi_get(native):
-        ok = True
-    progress[BUSY] = 0.0
-    progress[STEPS] += 1.0
-    if not ok:
-        progress[FAILED] = -1.0
-        data.failed_step = data.k
+    receive(fmu, model, data)
+    if not advance_fmu(fmu, data):
         return
+    native, progress, n = fmu.native, fmu.progress, forces.size
     forces[:] = 0.0  # those that no output sets, as a pilot may have set them
     for i in range(fmu.targets.size):
         target, value = fmu.targets[i], native.outputs[i]
@@ -57,8 +57,67 @@ def call_law(fmu: FmuCalls, model: StepModel, data: StepData, forces: Array) -> 
             data.failed_step = data.k
 
 
+def exchange_component(component: ComponentCalls, model: StepModel, data: StepData) -> None:
+    """Let a component receive signals of the beginning of a step, and the plant its outputs (Jacobi)."""
+    receive(component.fmu, model, data)
+    send(component, data)
+
+
+def step_component(component: ComponentCalls, model: StepModel, data: StepData) -> None:
+    """Step a component; in Gauss-Seidel's order it receives the latest signals, and the plant its new outputs."""
+    fmu = component.fmu
+    if not model.jacobi:
+        receive(fmu, model, data)
+    if not advance_fmu(fmu, data):
+        return
+    for i in range(fmu.targets.size):
+        value = fmu.native.outputs[i]
+        data.component_results[component.first + i] = value
+        if fmu.targets[i] > 0 and not math.isfinite(value) and fmu.progress[FAILED] == 0.0:
+            fmu.progress[FAILED] = 1.0 + i
+            data.failed_step = data.k
+    if not model.jacobi:
+        send(component, data)
+
+
+def send(component: ComponentCalls, data: StepData) -> None:
+    """Set the inputs of the plant to the latest outputs of a component."""
+    for i in range(component.senders.size):
+        value = data.component_results[component.first + component.senders[i]]
+        component.plant_inputs[component.receivers[i]] = value
+
+
+def receive(fmu: FmuCalls, model: StepModel, data: StepData) -> None:
+    """Set the inputs of an FMU to their signals."""
+    collect_signals(fmu.signals, model, data)
+    for i in range(fmu.sources.size):
+        fmu.native.inputs[i] = fmu.signals[fmu.sources[i]]
+
+
+def advance_fmu(fmu: FmuCalls, data: StepData) -> bool:
+    """Send the inputs of an FMU, step it and get its outputs; return True unless it fails."""
+    native, progress = fmu.native, fmu.progress
+    progress[NOW] = data.now
+    progress[BUSY] = 1.0
+    ok = False
+    if fmi_set(native) and fmi_do_step(native, progress[STEPS] * fmu.period, fmu.period) and fmi_get(native):
+        ok = True
+    progress[BUSY] = 0.0
+    progress[STEPS] += 1.0
+    if not ok:
+        progress[FAILED] = -1.0
+        data.failed_step = data.k
+    return ok
+
+
+def empty_signals_of(data: StepData) -> Array:
+    """Return an array for `collect_signals`."""
+    n = data.weights.size
+    return np.zeros(13 + n + 5 * (n + 1) + data.row.size + data.component_results.size)
+
+
 def collect_signals(signals: Array, model: StepModel, data: StepData) -> None:
-    """Copy what a law receives, and the row, side by side."""
+    """Copy what a law receives, the row, and the latest outputs of components side by side."""
     state, n = data.state, data.weights.size
     signals[:3], signals[3:7], signals[7:13] = state.position, state.quaternion, state.velocity_body
     signals[13 : 13 + n] = data.weights
@@ -67,7 +126,9 @@ def collect_signals(signals: Array, model: StepModel, data: StepData) -> None:
         write_evaluation(signals[first:], data.true_evaluation)
     else:
         write_evaluation(signals[first:], data.arbiter_evaluation)
-    signals[first + 5 * m :] = data.row
+    first += 5 * m
+    signals[first : first + data.row.size] = data.row
+    signals[first + data.row.size :] = data.component_results
 
 
 def write_evaluation(signals: Array, evaluation: RegionEvaluation) -> None:

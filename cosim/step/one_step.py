@@ -10,7 +10,17 @@ from cosim.step.mission_legs import advance_mission
 from cosim.step.plant_calls import PlantCalls, fmi_do_step, fmi_get, fmi_get_flags, fmi_set
 from cosim.step.region_positions import evaluate, move_regions
 from cosim.step.sensing import fail_thrusters, measure, read_outputs
-from cosim.step.step_model import LOCATED, MEASURED, PLANT_STEP, Array, Integers, StepData, StepModel, call_back
+from cosim.step.step_model import (
+    LOCATED,
+    MEASURED,
+    PLANT_STEP,
+    Array,
+    Integers,
+    StepData,
+    StepModel,
+    call_all,
+    call_back,
+)
 
 
 def step(model: StepModel, data: StepData, plant: PlantCalls, k: int) -> None:
@@ -21,6 +31,7 @@ def step(model: StepModel, data: StepData, plant: PlantCalls, k: int) -> None:
     if model.jacobi and k > 0:
         update_delayed_weights(model, data)
     measure(model, data, plant)
+    call_all(data, data.exchanges)
     decide(model, data, k % model.arbiter_every == 0, k % model.control_every == 0)
     if k < model.steps and data.failed_step < 0:
         step_plant(model, data, plant)
@@ -83,7 +94,10 @@ def step_plant(model: StepModel, data: StepData, plant: PlantCalls) -> None:
         np.isnan(data.stuck), np.where(model.jacobi, data.delayed, data.inputs[:own]), data.stuck
     )
     data.delayed[:] = data.inputs[:own]
-    data.inputs[own:] = native.inputs[own:]  # of a coupled plant: its caller sets them
+    call_all(data, data.components)
+    data.inputs[own:] = native.inputs[own:]  # of a coupled plant: its caller sets them, or components
+    if data.failed_step >= 0:
+        return
     if fmi_set(native) and fmi_do_step(native, data.now, model.step) and fmi_get(native) and fmi_get_flags(native):
         call_back(data, PLANT_STEP)
     else:

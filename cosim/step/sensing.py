@@ -45,8 +45,9 @@ def measure(model: StepModel, data: StepData, plant: PlantCalls) -> None:
 
 
 def read_outputs(data: StepData, plant: PlantCalls) -> None:
-    """Copy the plant's outputs of the beginning of a step."""
+    """Copy the outputs of the beginning of a step: of the plant, and of FMUs beside it."""
     data.outputs[: data.first_applied] = plant.native.outputs[: data.first_applied]
+    data.component_outputs[:] = data.component_results
 
 
 def estimate_state(model: StepModel, data: StepData) -> None:

@@ -142,6 +142,10 @@ class StepData(State):
     by_criterion: Array  # (criteria,) weight of each criterion
     weights: Array  # (n,) weight of each region's criterion
     calls: Integers  # (12,) addresses of C functions and of their arguments; 0: none
+    components: Integers  # (2 c,) the same of the steps of FMUs beside the plant, in their order
+    exchanges: Integers  # (2 e,) the same of what they receive and send before a step (Jacobi)
+    component_outputs: Array  # (p,) outputs of these FMUs at the beginning of the step
+    component_results: Array  # (p,) their latest outputs
     manual: bool  # True: the command is given, and the law does not compute it
     law: LawOutputs
     expected: Array  # (6,) prediction that the arbiter uses; NaN: none
@@ -162,7 +166,12 @@ class StepData(State):
 
 def set_call(data: StepData, which: int, call: Call) -> None:
     """Let a step call a function, such as at `LAW`, whose errors end it; the caller keeps it alive."""
-    data.calls[which : which + 2] = call.address, call.words
+    register_call(data, data.calls, which, call)
+
+
+def register_call(data: StepData, calls: Integers, i: int, call: Call) -> None:
+    """Let a step call a function by the items `i` and on of an array; its errors end the step."""
+    calls[i : i + 2] = call.address, call.words
     call.on_error = functools.partial(_end_step, data)
 
 
@@ -170,6 +179,13 @@ def call_back(data: StepData, call: int) -> None:
     """Call a C function of `StepData.calls`, if there is one."""
     if data.calls[call] != 0:
         call_c(data.calls[call], WORDS, data.calls[call + 1])
+
+
+def call_all(data: StepData, calls: Integers) -> None:
+    """Call C functions, given by their addresses and those of their arguments, 0 for none, until a step fails."""
+    for i in range(0, calls.size, 2):
+        if calls[i] != 0 and data.failed_step < 0:
+            call_c(calls[i], WORDS, calls[i + 1])
 
 
 def _end_step(data: StepData) -> None:

@@ -1,4 +1,4 @@
-"""A current that grows and turns with depth, as an FMU: built by system.py, with pythonfmu."""
+"""A current that grows and turns with depth, as an FMU: for hanging.toml, built by pythonfmu."""
 
 import math
 

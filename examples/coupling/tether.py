@@ -1,4 +1,4 @@
-"""A tether from an anchor to a point of the body, as an FMU: built by system.py, with pythonfmu."""
+"""A tether from an anchor to a point of the body, as an FMU: for hanging.toml, built by pythonfmu."""
 
 from math import sqrt
 

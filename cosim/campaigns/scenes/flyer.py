@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cosim.batch.fused import fly_scenario
+from cosim.batch.fused import FlownVehicle
 from cosim.batch.outcome import Arrivals, arrivals_of
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
@@ -15,14 +15,14 @@ from cosim.campaigns.scenes.law_gains import fmu_table, gains_from, law_class
 from cosim.campaigns.scenes.scenario_scene import AnyScene
 from cosim.campaigns.scenes.scene import ODIN
 from cosim.results.record import Rows
+from cosim.scenario.file_copies import fmus_of
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_vehicle
 from cosim.scenario.vehicle_model import vehicle_model
-from cosim.simulation.fmu_law import FmuLaw
 from cosim.step.plant_calls import Clock
 from cosim.step.score import FlightMetrics
-from plant_fmu import Plant
-from plant_fmu.vehicle import Vehicle, load_vehicle
+from plant_fmu.build import cached_fmu
+from plant_fmu.vehicle import load_vehicle
 
 _LEVEL = (1.0, 0.0, 0.0, 0.0)  # attitude without rotation, from body to world
 _ROUNDING = 1e-9  # tolerance of a count of steps
@@ -96,9 +96,9 @@ class SceneFlyer:
         if fmu_table(law) is None:
             model, level = vehicle_model(vehicle), np.array(_LEVEL)
             law_class(law).for_vehicle(model, self.gains, level, self.conditions.control, 0)  # refuses invalid gains
-        self._fmus: dict[str, FmuLaw] = {}  # the law for each vehicle
+        cached_fmu(vehicle, 3)  # raises an error if there is none
         self._clock = Clock()
-        self._plants = {ODIN: Plant(vehicle)}
+        self._vehicles: dict[tuple[str, ...], FlownVehicle] = {}  # by vehicle and other FMUs
 
     def fly(self, scene: AnyScene, trace: bool = False) -> tuple[Score, Rows]:
         """Fly one scene.
@@ -123,20 +123,15 @@ class SceneFlyer:
             If there is no FMU of its vehicle.
         """
         scenario = scene_scenario(scene, self.law, self.gains, self.conditions)
-        plant = self._plant(scenario.vehicle)
-        metrics, _, data, signals = fly_scenario(plant, scenario, trace, self._clock.numbers, self._fmu_law(scenario))
+        metrics, _, data, signals = self._vehicle(scenario).fly(scenario, trace, self._clock.numbers)
         return self._score(metrics, scenario)._replace(arrivals=arrivals_of(data.arrivals)), signals
 
-    def _fmu_law(self, scenario: Scenario) -> FmuLaw | None:
-        name = scenario.vehicle.name
-        if scenario.law.fmu and name not in self._fmus:
-            self._fmus[name] = FmuLaw(scenario)
-        return self._fmus.get(name)
-
-    def _plant(self, vehicle: Vehicle) -> Plant:
-        if vehicle.name not in self._plants:
-            self._plants[vehicle.name] = Plant(vehicle)
-        return self._plants[vehicle.name]
+    def _vehicle(self, scenario: Scenario) -> FlownVehicle:
+        fmus = (str(fmu._replace(parameters={})) for fmu in fmus_of(scenario))
+        key = (scenario.vehicle.name, *fmus)
+        if key not in self._vehicles:
+            self._vehicles[key] = FlownVehicle(scenario)
+        return self._vehicles[key]
 
     def _score(self, metrics: FlightMetrics, scenario: Scenario) -> Score:
         inside, since, step = metrics.inside > 0.0 and metrics.failed_step < 0, metrics.last_entered, scenario.time.step
@@ -155,11 +150,9 @@ class SceneFlyer:
         )
 
     def close(self) -> None:
-        """Free plants and laws. May be called twice."""
-        for plant in self._plants.values():
-            plant.close()
-        for law in self._fmus.values():
-            law.close()
+        """Free all FMUs. May be called twice."""
+        for vehicle in self._vehicles.values():
+            vehicle.close()
 
     def __enter__(self) -> SceneFlyer:
         return self

@@ -11,7 +11,7 @@ from controller.law import Diagnostic
 from controller.translator.static_data import Expression
 from cosim.batch.fused import require_fused
 from cosim.replay.view_columns import added_columns, is_drawn
-from cosim.scenario.law_factory import law_of
+from cosim.scenario.law_factory import law_of, require_no_fmus
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import start_values
 from cosim.simulation.columns import columns_of_channels
@@ -31,6 +31,7 @@ class Flight:
 
     def __init__(self, scenario: Scenario) -> None:
         require_fused(scenario, "an interactive replay")
+        require_no_fmus(scenario, "an interactive replay")
         self.scenario, self.law, self.start = scenario, law_of(scenario), start_values(scenario)
         self.variables = {v.name: v for v in variables(scenario.vehicle)}
         self._references = {name: i for i, name in enumerate(self.variables)}

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 from cosim.replay.interactive.adjustable import Slot
 from cosim.scenario.changes import with_values
-from cosim.scenario.scenario import VEHICLE_COPY, Scenario
+from cosim.scenario.file_copies import VEHICLE_COPY
+from cosim.scenario.scenario import Scenario
 from cosim.scenario.toml_text import scenario_text
 
 _MARK = 730000000.5  # first of a row of placeholders for the page's numbers, of equal length as text

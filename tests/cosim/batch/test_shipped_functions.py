@@ -28,6 +28,7 @@ from cosim.precheck.stability import start_weights
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 from cosim.ssp.controller import controller_component
+from plant_fmu import load_vehicle
 from plant_fmu.build import cached_fmu
 
 THROUGH_SENSORS = ["sensing.through=sensors", "sensing.position_noise=0.0", "sensing.velocity_noise=0.0"]
@@ -76,6 +77,10 @@ def test_shipped_functions_are_exactly_those_called(called, tmp_path):
         master.run()
     controller = cached_fmu(controller_component(load_scenario("paper", SHORT)), 3)
     with Master(load_scenario("paper", [*SHORT, f"law.file={controller}"])) as master:
+        master.run()
+    plant = str(cached_fmu(load_vehicle("odin"), 3))
+    others = {"components": [{"name": "twin", "file": plant}], "plant.file": plant, "master.order": "jacobi"}
+    with Master(load_scenario("paper", SHORT).replace(others)) as master:
         master.run()
     find_path([], load_scenario("paper").goal_region, (0.0, 0.0, 0.0), DeployableGains(), 0.1)
     clearances_at(np.zeros((2, 3)), Region("ball", Sphere((0.0, 0.0, 0.0), 1.0), "out"))

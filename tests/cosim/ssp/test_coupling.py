@@ -1,32 +1,51 @@
-"""External FMUs on a coupled plant in independent masters: the example of a tethered vehicle in a current."""
+"""FMUs beside the plant, in our master and in independent ones: the example of a tethered vehicle in a current."""
 
-import runpy
-from pathlib import Path
+import shutil
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from controller import FunctionLaw
+from cosim import Master, load_scenario
 from cosim.ssp.system import MOTION
-from plant_fmu import Plant, load_vehicle
-from plant_fmu.build import cached_fmu
+from plant_fmu import load_vehicle
 from plant_fmu.variables import variables
-from plant_fmu.vehicle_component import make_vehicle_component
+from tests.architecture.modules import ROOT
+from tests.cosim.simulation.keep import Keep
+from tests.cosim.ssp.coupled_system import write_coupled_system
 from tests.cosim.ssp.masters import in_master
 from tests.plant_fmu.transcription import evaluate, rotation
 
-EXAMPLE = Path(__file__).parents[3] / "examples" / "coupling" / "system.py"
+EXAMPLE = ROOT / "examples" / "coupling"
 ANCHOR, POINT, LENGTH, STIFFNESS, DAMPING = np.array([0, 0, -1.0]), np.array([-0.25, 0, -0.2]), 6.0, 200.0, 100.0
 WEIGHT, BUOYANCY = 1248.25, 1228.25
 STEP = 0.02
 
 
 @pytest.fixture(scope="module")
-def packed(tmp_path_factory):
-    pytest.importorskip("pythonfmu")
-    write = runpy.run_path(str(EXAMPLE))["write_system"]
+def hanging(tmp_path_factory):
+    """Return a function that loads the example with a step and a duration, and without its law's thrusters."""
+    builder = pytest.importorskip("pythonfmu.builder")
     folder = tmp_path_factory.mktemp("coupled")
-    return lambda step: write(folder / f"{step}.ssp", 250.0, step)
+    for name in ("current", "tether"):
+        builder.FmuBuilder.build_FMU(EXAMPLE / f"{name}.py", folder)
+    shutil.copy(EXAMPLE / "hanging.toml", folder)
+
+    def load(steps, step=STEP):
+        changes = [f"time.step={step}", f"time.duration={steps * step}", "initial.position=[0,0,0]"]
+        changes += ["law.name=pd", "actuation.through=wrench", "master.order=jacobi"]
+        return load_scenario(folder / "hanging.toml", changes)
+
+    return load
+
+
+def moved(scenario):
+    """Return the motion after each step in our master, without a force of the law."""
+    with Master(scenario, FunctionLaw(lambda *_: np.zeros(6))) as master:
+        kept = Keep(master)
+        master.run([kept])
+    return np.column_stack([kept[name] for name in MOTION])[1:]
 
 
 def current(time, depth):
@@ -44,29 +63,6 @@ def tether(motion):
     shortening = line @ (R @ (velocity + np.cross(omega, POINT))) / distance
     tension = STIFFNESS * (distance - LENGTH) - DAMPING * shortening
     return max(tension, 0.0) * line / distance if distance > LENGTH else np.zeros(3)
-
-
-def in_turn(steps, step):
-    """Return the motion with the outputs exchanged after each step (Jacobi's order)."""
-    vehicle = make_vehicle_component(load_vehicle("odin"), {"weight": WEIGHT}, coupled=True)
-    rows, force, water, rate, before = [], np.zeros(3), 0j, 0j, 0.0
-    with Plant(cached_fmu(vehicle, 2)) as plant:
-        plant.initialize()
-        motion = np.array([plant[name] for name in MOTION])
-        for k in range(steps):
-            for i, axis in enumerate("xyz"):
-                plant[f"external.world.force.{axis}"] = force[i]
-                plant[f"external.world.point.{axis}"] = POINT[i] if k else 0.0
-            for axis, part in (("x", np.real), ("y", np.imag)):
-                plant[f"current_input.{axis}"] = part(water)
-                plant[f"current_input_rate.{axis}"] = part(rate)
-            plant.step(step)
-            water, by_time, by_depth = current((k + 1) * step, motion[2])
-            force, rate = tether(motion), by_time + by_depth * (motion[2] - before) / step
-            before = motion[2]
-            motion = np.array([plant[name] for name in MOTION])
-            rows.append(motion)
-    return np.array(rows)
 
 
 def continuous(end):
@@ -90,31 +86,32 @@ def continuous(end):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("master", ["fmpy", "ecos", "libcosim"])
-def test_masters_connect_a_current_and_a_tether(master, packed, tmp_path):
+def test_our_master_equals_independent_ones(master, hanging, tmp_path):
     """The plant sinks for 20 s: the tether gets taut, and the current turns and grows."""
-    expected = in_turn(1000, STEP)
-    got = in_master(master, packed(STEP), 1000, STEP, tmp_path / "rows.npy")
+    scenario = hanging(1000)
+    system = write_coupled_system(scenario, tmp_path / "hanging.ssp")
+    expected, got = in_master(master, system, 1000, STEP, tmp_path / "rows.npy"), moved(scenario)
     assert any(tether(motion).any() for motion in expected)
     np.testing.assert_allclose(got, expected, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.slow
-def test_coupling_error_converges_linearly_with_the_step(packed, tmp_path):
+def test_coupling_error_converges_linearly_with_the_step(hanging):
     """Half the step, half the error: what is held within a step lags by that much."""
     exact = continuous(20.0)
     errors = []
     for step in (STEP, 0.5 * STEP):
         steps = round(20.0 / step)
-        got = in_master("fmpy", packed(step), steps, step, tmp_path / "rows.npy")[-1]
+        got = moved(hanging(steps, step))[-1]
         errors.append(np.abs(got - exact).max())
     assert errors[1] < 0.015
     assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.2)
 
 
 @pytest.mark.slow
-def test_static_tether_stretch_matches_net_weight_and_drag(packed, tmp_path):
+def test_static_tether_stretch_matches_net_weight_and_drag(hanging):
     """By hand, with the drag of each body axis; and the moments of tether and weight cancel."""
-    end = in_master("fmpy", packed(STEP), 12500, STEP, tmp_path / "rows.npy")[-1]
+    end = moved(hanging(12500))[-1]
     assert np.abs(end[7:]).max() < 1e-3
     R = rotation(end[3:7])
     water, _, _ = current(250.0, end[2])

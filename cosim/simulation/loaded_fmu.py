@@ -1,0 +1,94 @@
+"""An FMU of the user's, loaded: restarted, watched while it runs, and called by its C functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from cosim.errors import ScenarioError
+from cosim.scenario.fmu_tables import UserFmu
+from cosim.simulation.watchdog import Watchdog
+from cosim.step.fmu_call import BUSY, FAILED, NOW, STEPS
+from plant_fmu import Plant, PlantError
+from plant_fmu.errors import StepError
+from plant_fmu.running.native import Native
+
+
+class LoadedFmu:
+    """One instance of a co-simulation FMU, with steps of one length [s], which a key of the scenario gives."""
+
+    def __init__(self, fmu: UserFmu, period: float, period_key: str) -> None:
+        self.fmu, self.period, self._period_key = fmu, period, period_key
+        self._watchdog = Watchdog(fmu.label, fmu.timeout)
+        self.progress = self._watchdog.progress
+        try:
+            self._plant = self._load()
+        except BaseException:
+            self.close()
+            raise
+
+    def _load(self) -> Plant:
+        plant: Plant = self._watched(lambda: Plant(self.fmu.file))
+        return plant
+
+    def restart(self, fmu: UserFmu, start: Mapping[str, float] | None = None) -> None:
+        """Begin again at time 0, with parameters and start values; in a new instance if it cannot be reset."""
+        if self._plant.initialized:
+            try:
+                self._watched(self._plant.reset)
+            except PlantError:
+                self._plant.close()
+                self._plant = self._load()
+        try:
+            self._plant.set(fmu.parameters)
+        except PlantError as error:
+            raise ScenarioError(f"{fmu.key}.parameters: {error}") from error
+        self._watched(lambda: self._plant.set(start or {}))
+        self._watched(self._plant.initialize)
+        try:
+            self._plant.prepare_steps(self.period)
+        except PlantError as error:
+            raise ScenarioError(f"{self._period_key}: {self.fmu.label}: {error}") from error
+        self.progress[:] = 0.0
+
+    def _watched(self, act: Callable[[], Any]) -> Any:
+        """Call a function of the FMU within its time limit."""
+        self.progress[STEPS] -= 1.0  # tells this call from the one before
+        self.progress[BUSY] = 1.0
+        try:
+            return act()
+        except PlantError as error:
+            text = str(error)
+            raise PlantError(text if self.fmu.label in text else f"{self.fmu.label}: {text}") from error
+        finally:
+            self.progress[BUSY] = 0.0
+
+    def native(self, inputs: Sequence[str], outputs: Sequence[str]) -> Native:
+        """Return the C functions, with buffers of some variables; the inputs have their present values."""
+        self._native, self._outputs = self._plant.native(tuple(inputs), tuple(outputs)), tuple(outputs)
+        self._native.inputs[:] = self.values(inputs)
+        return self._native
+
+    def values(self, names: Sequence[str]) -> list[float]:
+        """Return the present values of real variables."""
+        return [float(self._plant[name]) for name in names]
+
+    def raise_error(self, expected: str = "a finite number") -> None:
+        """Raise the error of the last step, if it failed."""
+        failed, now, label = int(self.progress[FAILED]), float(self.progress[NOW]), self.fmu.label
+        if failed > 0:
+            value, name = self._native.outputs[failed - 1], self._outputs[failed - 1]
+            raise PlantError(f"{label}: t = {now:.6g} s: {name} is {value}, expected {expected}")
+        if failed < 0:
+            self._plant.count_steps(int(self.progress[STEPS]) - 1)
+            begin = self._plant.time  # the FMU's own, which begins again where a law regains control
+            try:
+                self._plant.raise_failure(self._native)
+            except StepError as error:
+                raise PlantError(f"{label}: t = {now + error.time - begin:.6g} s: {error.reason}") from error
+
+    def close(self) -> None:
+        """Free the FMU. May be called twice."""
+        if hasattr(self, "_plant"):
+            self._plant.close()
+        self._watchdog.close()
