@@ -12,9 +12,9 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import logging
 import math
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -141,6 +141,7 @@ def make_grid(
     axes = [low[i] + h * np.arange(counts[i]) for i in range(3)]
     values = _cached(
         f"{key} {low.tolist()} {h!r} {counts.tolist()}",
+        nodes,
         lambda: distances(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)),
     ).reshape(counts)
     # rounding moves a distance by half a quantum
@@ -160,25 +161,24 @@ def _default_spacing(size: Array) -> float:
     return float(f"{high:.2g}") if float(f"{high:.2g}") >= high else float(f"{high * 1.05:.2g}")
 
 
-def _cached(key: str, compute: Callable[[], Array]) -> Array:
+def _cached(key: str, nodes: int, compute: Callable[[], Array]) -> Array:
     """Return rounded distances from the user's cache, or compute and keep them."""
     name = hashlib.sha256(f"{_VERSION} {key}".encode()).hexdigest()[:32]
-    path = Path(platformdirs.user_cache_dir("subreach")) / "grids" / f"{name}.npz"
+    path = Path(platformdirs.user_cache_dir("subreach")) / "grids" / f"{name}.grid"
     try:
         if is_trusted(path.parent):
-            with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as kept:
-                return np.asarray(kept["quanta"] * _QUANTUM)
-    except (OSError, ValueError, KeyError) as error:
+            kept = np.frombuffer(zlib.decompress(path.read_bytes()), np.int32)
+            if kept.size == nodes:  # else it was cut
+                return kept * _QUANTUM
+    except (OSError, ValueError, zlib.error) as error:
         log.debug("%s: %s", path, error)
     quanta = np.rint(compute() / _QUANTUM)
     if not np.isfinite(quanta).all():
         raise RegionError("distances are not finite, expected a body of finite size")
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, quanta=quanta.astype(np.int32))
     try:
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         if is_trusted(path.parent):
-            write_atomic(path, buffer.getvalue())
+            write_atomic(path, zlib.compress(quanta.astype(np.int32).tobytes()))
     except OSError as error:
         log.debug("%s: %s", path, error)
     return quanta * _QUANTUM

@@ -25,6 +25,7 @@ _DAMAGED = (
     ValueError, IndexError, KeyError, TypeError, AttributeError, AssertionError, NotImplementedError, struct.error,
     MemoryError, ZeroDivisionError,
 )  # fmt: skip
+_LIBRARIES = ("libigl>=2.6", "rtree>=1.3", "trimesh>=4.5")
 _PAIRS_AT_A_TIME = 200_000
 _CROSSED = 1e-9  # fraction of an edge or a triangle, by which a crossing is inside both
 
@@ -147,7 +148,7 @@ def _place(point: Array) -> str:
 
 def _library(name: str) -> ModuleType:
     try:
-        importlib.import_module("rtree")
+        importlib.import_module("rtree")  # which trimesh imports when it needs it
         return importlib.import_module(name)
     except ImportError as error:
-        raise RegionError(f"mesh: needs {error.name}, of the extra mesh: pip install 'subreach[mesh]'") from error
+        raise RegionError(f"mesh: needs {', '.join(_LIBRARIES)}; {error.name} is not installed") from error

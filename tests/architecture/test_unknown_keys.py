@@ -7,11 +7,13 @@ import tomllib
 from functools import cache, reduce
 from operator import getitem
 
+import msgspec
 import pytest
 import tomli_w
 
 from controller import LAWS
 from controller.regions.region_set import SHAPES
+from controller.regions.shapes import ENTRIES
 from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.campaigns.scenes.scene_file import read_scenes
 from cosim.errors import CosimError, RunError, ScenarioError
@@ -68,6 +70,9 @@ def examples():
     scene |= {"noise": {"position": 0.1}, "failed_thruster": {"index": 1, "time": 2.0}}
     scenarios = ("paper", "docking", str(ROOT / "tests" / "cosim" / "ssp" / "all-shapes.toml"))
     valid = [("scenario", tomllib.loads(load_scenario(name).toml())) for name in scenarios]
+    from_files = [msgspec.to_builtins({"type": name} | vars(ENTRIES[name].example)) for name in ("mesh", "points")]
+    region = {"criterion": "obstacle", "keep": "out", "gain": 1.0}
+    valid[1][1]["regions"] += [region | {"name": shape["type"], "shape": shape} for shape in from_files]
     valid[1][1]["failures"] = [{"thruster": 1, "time": 3.0}]
     vehicles = [(ROOT / f"plant_fmu/vehicles/{name}.toml").read_text() for name in shipped_vehicles()]
     valid += [("vehicle", tomllib.loads(text)) for text in vehicles]

@@ -40,9 +40,9 @@ class Mesh:
     file: str
     axes: str
     scale: float = 1.0
-    position: Vector3 = (0.0, 0.0, 0.0)
-    offset: float = 0.0
-    spacing: float = 0.0
+    position: Vector3 = (0.0, 0.0, 0.0)  # m, NED
+    offset: float = 0.0  # m
+    spacing: float = 0.0  # m
 
     def __post_init__(self) -> None:
         require_frame("mesh", self.axes, self.scale, self.position)

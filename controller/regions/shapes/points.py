@@ -18,13 +18,13 @@ from controller.regions.shape import Array, Bounds, Vector3, require, require_fi
 from controller.regions.solid_file import digest, file_version, read_bounded
 from controller.regions.triangle_mesh import Mesh
 
-_FORMATS = (".csv", ".txt", ".xyz", ".npy")
+_FORMATS = (".csv", ".txt", ".xyz")
 _MAX_POINTS = 1_000_000
 
 
 @dataclass(frozen=True)
 class Points:
-    """All points within `radius` [m] of one of a file's points, CSV, TXT, XYZ or NPY; g is the signed distance [m].
+    """All points within `radius` [m] of one of a file's points, CSV, TXT or XYZ; g is the signed distance [m].
 
     A row has x, y and z, whose directions are `axes`; columns beyond these are not used. A length of the file times
     `scale` is in meters; the file's origin is at `position` [m, NED]. Distances are interpolated between the nodes of a
@@ -44,11 +44,11 @@ class Points:
     kind: ClassVar[int]
     unit: ClassVar[str] = "m"
     file: str
-    radius: float
+    radius: float  # m
     axes: str
     scale: float = 1.0
-    position: Vector3 = (0.0, 0.0, 0.0)
-    spacing: float = 0.0
+    position: Vector3 = (0.0, 0.0, 0.0)  # m, NED
+    spacing: float = 0.0  # m
 
     def __post_init__(self) -> None:
         require_frame("points", self.axes, self.scale, self.position)
@@ -96,17 +96,14 @@ def _grid(file: str, modified: int, size: int, axes: str, scale: float, radius: 
 def _read_points(path: Path) -> Array:
     """Read positions, shape (n, 3), in the file's units and axes."""
     try:
-        if path.suffix.lower() == ".npy":
-            rows = np.load(path, allow_pickle=False)
-        else:
-            lines = path.read_text(encoding="utf-8-sig").replace(",", " ").replace(";", " ").splitlines()
-            if lines and not _is_row(lines[0]):
-                lines = lines[1:]  # names of columns
-            if not lines:
-                raise ValueError("no rows")
-            rows = np.loadtxt(lines, ndmin=2, usecols=(0, 1, 2))
+        lines = path.read_text(encoding="utf-8-sig").replace(",", " ").replace(";", " ").splitlines()
+        if lines and not _is_row(lines[0]):
+            lines = lines[1:]  # names of columns
+        if not lines:
+            raise ValueError("no rows")
+        rows = np.loadtxt(lines, ndmin=2, usecols=(0, 1, 2))
         points = np.asarray(rows, dtype=float)
-    except (OSError, ValueError, EOFError, MemoryError) as error:
+    except (OSError, ValueError, MemoryError) as error:
         raise RegionError(f"{path}: cannot be read as rows of x, y and z: {error}") from error
     if points.ndim != 2 or points.shape[1] < 3 or not 1 <= len(points) <= _MAX_POINTS:
         raise RegionError(f"{path}: has the shape {points.shape}, expected 1 to {_MAX_POINTS:,} rows of x, y and z")

@@ -82,14 +82,14 @@ def test_mesh_to_stay_within_is_never_larger_than_the_true_one(tmp_path):
 def test_points_are_kept_out_of_by_their_radius(tmp_path_factory, seed, radius, spacing):
     rng = np.random.default_rng(seed)
     cloud = rng.uniform(-1.0, 1.0, (int(rng.integers(1, 12)), 3))
-    path = tmp_path_factory.mktemp("cloud") / "cloud.npy"
-    np.save(path, cloud)
+    path = tmp_path_factory.mktemp("cloud") / "cloud.xyz"
+    np.savetxt(path, cloud, fmt="%.17g")
     shape = Points(str(path), radius, "ned", position=(3.0, 0.0, 1.0), spacing=spacing)
     points = np.vstack([rng.uniform(-2.5, 2.5, (300, 3)), rng.uniform(-30.0, 30.0, (100, 3))]) + shape.position
     true = np.linalg.norm(cloud + shape.position - points[:, None], axis=2).min(axis=1) - radius
     reported = clearances(shape, points)
     assert (reported <= np.maximum(true, 0.0) + 1e-9).all()
-    assert np.array_equal(np.signbit(reported[np.abs(true) > shape.error()]), true[np.abs(true) > shape.error()] < 0.0)
+    assert (reported[true > shape.error() + math.sqrt(3.0) / 2.0 * spacing] > 0.0).all()
 
 
 def test_surface_of_points_is_closed_on_the_region_and_faces_outward(tmp_path):
@@ -160,12 +160,10 @@ def test_solid_inside_out_and_bodies_apart_are_accepted(tmp_path):
 @given(st.data())
 def test_damaged_files_are_a_solid_or_one_line(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("damaged")
-    name = data.draw(st.sampled_from(["solid.stl", "solid.obj", "map.csv", "map.npy"]))
+    name = data.draw(st.sampled_from(["solid.stl", "solid.obj", "map.csv"]))
     path = folder / name
     if name.startswith("solid"):
         trimesh.creation.box((1.0, 1.0, 1.0)).export(path)
-    elif name.endswith("npy"):
-        np.save(path, np.eye(3))
     else:
         np.savetxt(path, np.eye(3), delimiter=",")
     content = bytearray(path.read_bytes())
