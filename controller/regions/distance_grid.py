@@ -169,7 +169,7 @@ def _cached(key: str, nodes: int, compute: Callable[[], Array]) -> Array:
         if is_trusted(path.parent):
             kept = np.frombuffer(zlib.decompress(path.read_bytes()), np.int32)
             if kept.size == nodes:  # else it was cut
-                return kept * _QUANTUM
+                return np.asarray(kept * _QUANTUM, dtype=float)
     except (OSError, ValueError, zlib.error) as error:
         log.debug("%s: %s", path, error)
     quanta = np.rint(compute() / _QUANTUM)

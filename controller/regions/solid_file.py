@@ -19,6 +19,7 @@ from controller.regions.triangle_mesh import Mesh
 
 MAX_BYTES = 100_000_000
 MAX_TRIANGLES = 500_000
+_MAX_COORDINATE = 1e9  # in the file's units
 FORMATS = (".stl", ".obj")
 # what trimesh raises for files that are damaged
 _DAMAGED = (
@@ -36,6 +37,8 @@ def read_solid(path: Path) -> Mesh:
     data = read_bounded(path, FORMATS)
     try:
         loaded = trimesh.load(path, file_type=path.suffix[1:].lower(), force="mesh", skip_materials=True)
+        far = not (np.abs(loaded.vertices) <= _MAX_COORDINATE).all()
+        _require(path, not far, "coordinates that are not finite or too great", f"numbers up to {_MAX_COORDINATE:g}")
         loaded.merge_vertices(merge_tex=True, merge_norm=True)
         loaded.update_faces(loaded.nondegenerate_faces())
         vertices, triangles = np.array(loaded.vertices, dtype=float), np.array(loaded.faces, dtype=np.int64)
@@ -43,7 +46,6 @@ def read_solid(path: Path) -> Mesh:
         raise RegionError(f"{path}: cannot be read as {path.suffix[1:].upper()}: {error}") from error
     _require(path, len(triangles) > 0, "no triangles", f"a closed surface ({len(data)} bytes were read)")
     _require(path, len(triangles) <= MAX_TRIANGLES, f"{len(triangles):,} triangles", f"at most {MAX_TRIANGLES:,}")
-    _require(path, bool(np.isfinite(vertices).all()), "coordinates that are not finite", "finite ones")
     _require_closed(path, vertices, loaded)
     loaded.fix_normals(multibody=False)
     _require_no_crossings(path, loaded)
