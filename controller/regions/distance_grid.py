@@ -28,7 +28,7 @@ from controller.compiling.library import is_trusted, write_atomic
 from controller.errors import RegionError
 from controller.regions.geometry import clamp
 from controller.regions.numbers import LENGTH, SIZE, Number, vector
-from controller.regions.shape import Array, Bounds, Evaluation, require
+from controller.regions.shape import GREATEST, Array, Bounds, Evaluation, require
 from controller.regions.triangle_mesh import Mesh
 
 MAX_NODES = 4_000_000
@@ -130,6 +130,10 @@ def make_grid(
 ) -> DistanceGrid:
     """Make the grid about a body's upright box [m]; `key` names what is cached, spacing 0 is a default."""
     # Units of arguments: offset, spacing [m]
+    farthest = float(np.abs(body).max())
+    require(
+        farthest <= GREATEST, shape, "file", f"of positions up to {farthest:.3g} m", f"positions up to {GREATEST:g} m"
+    )
     size = body[1] - body[0] + 2.0 * max(offset, 0.0)
     h = spacing or _default_spacing(size)
     border = max(offset, 0.0) + _BORDER * h
