@@ -28,10 +28,10 @@ from cosim.campaigns.workers.dispatch import KILLED
 from cosim.campaigns.workers.work import Task
 from cosim.errors import CosimError, RunError
 from cosim.io.strict_json import understood
+from cosim.results.file_copies import VEHICLE_COPY
 from cosim.results.run_result import SCENARIO, Run
 from cosim.results.spans import spans
 from cosim.run.run_scenario import run_scenario
-from cosim.scenario.file_copies import VEHICLE_COPY
 from cosim.scenario.scenario import Scenario, load_scenario
 from cosim.scenario.toml_file import rename_former_keys
 from plant_fmu import PlantError, PlantFmuError

@@ -15,7 +15,7 @@ from cosim.identification.fit import STAGES
 from cosim.identification.intervals import NORMAL
 from cosim.io.atomic_file import write_atomic
 from cosim.report.web_page import render_page
-from cosim.scenario.file_copies import VEHICLE_COPY
+from cosim.results.file_copies import VEHICLE_COPY
 from cosim.scenario.toml_text import scenario_text
 
 SCENARIO, COMMANDS, STICKS, PAGE = "excite.toml", "commands.jsonl", "sticks.csv", "excite.html"

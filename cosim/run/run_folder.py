@@ -19,11 +19,11 @@ from cosim.replay.pages import write_replay
 from cosim.report.figure_process import FigureProcess
 from cosim.report.report_files import write_report
 from cosim.report.web_page import FIGURES
+from cosim.results.file_copies import VEHICLE_COPY, files_of
 from cosim.results.log_facts import IMPORT
 from cosim.results.record import RECORD, STREAM, load_record, require_utf8
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import COMMANDS_LOG, REPLAY, REPORT, SCENARIO, SUMMARY, Run, load_run, open_run
-from cosim.scenario.file_copies import VEHICLE_COPY, files_of
 from cosim.scenario.scenario import Scenario
 from plant_fmu.archive import is_temporary, temporary_folder
 

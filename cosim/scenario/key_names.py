@@ -73,6 +73,9 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
             return _region_key_name(name, entry, rest[2:], "goal.then[]")
         own = f"goal.{rest[0]}" in KEYS
         return _region_key_name("the goal", table["goal"] | {"shape": table["goal"]}, rest if own else ["shape", *rest])
+    if head == "components" and len(rest) > 1 and f"components[].{rest[1]}" in KEYS:
+        unit = KEYS[f"components[].{rest[1]}"].unit
+        return KeyName(f"{'.'.join(rest[2:]) or rest[1]} of {rest[0]}", unit)
     if head in ("failures", "outages") and len(rest) == 2:
         return KeyName(f"{rest[1]} of {head[:-1]} {rest[0]}", KEYS[f"{head}[].{rest[1]}"].unit)
     if head == "criteria" and len(rest) > 1:

@@ -7,7 +7,7 @@ from itertools import permutations
 from pathlib import Path
 
 from cosim.errors import RunError
-from cosim.scenario.file_copies import files_of
+from cosim.results.file_copies import files_of
 from cosim.scenario.law_factory import require_no_fmus
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import start_values

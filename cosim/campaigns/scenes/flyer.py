@@ -14,8 +14,8 @@ from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import fmu_table, gains_from, law_class
 from cosim.campaigns.scenes.scenario_scene import AnyScene
 from cosim.campaigns.scenes.scene import ODIN
+from cosim.results.file_copies import fmus_of
 from cosim.results.record import Rows
-from cosim.scenario.file_copies import fmus_of
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_vehicle
 from cosim.scenario.vehicle_model import vehicle_model

@@ -20,7 +20,7 @@ from cosim.campaigns.store.results import ARRIVALS, make_schema, make_table
 from cosim.campaigns.sweeps.design import Design
 from cosim.campaigns.workers.work import Rows, Work
 from cosim.errors import RunError
-from cosim.scenario.file_copies import VEHICLE_COPY, files_of, table_of_files
+from cosim.results.file_copies import VEHICLE_COPY, files_of, table_of_files
 from cosim.scenario.scenario import Scenario
 
 _TYPES = {np.bool_: pa.bool_(), np.float64: pa.float64()}

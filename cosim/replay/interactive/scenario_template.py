@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 
 from cosim.replay.interactive.adjustable import Slot
+from cosim.results.file_copies import VEHICLE_COPY
 from cosim.scenario.changes import with_values
-from cosim.scenario.file_copies import VEHICLE_COPY
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.toml_text import scenario_text
 

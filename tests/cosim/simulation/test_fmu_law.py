@@ -21,7 +21,7 @@ from cosim.campaigns.scenes.scene_rows import SCHEMA
 from cosim.campaigns.store.results import Results
 from cosim.command_line.cli import main
 from cosim.errors import ScenarioError
-from cosim.scenario.file_copies import files_of
+from cosim.results.file_copies import files_of
 from cosim.simulation.commands import commands as cmd
 from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.fmu_map import require_unit
