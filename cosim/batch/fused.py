@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from controller import Law, LawError
 from controller.compiling.function import BoundCall
 from cosim.batch.outcome import OUTCOME, BatchResult, arrivals_of, empty_outcomes
 from cosim.batch.variation import Variation
 from cosim.errors import RunError, ScenarioError
 from cosim.results.record import Rows
 from cosim.results.spans import SETTLED_FOR
-from cosim.scenario.law_factory import law_of, require_builtin_law
+from cosim.scenario.law_factory import OwnLaw, law_of, require_builtin_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import start_values
 from cosim.simulation.bindings import BoundLaw, bind_rules
@@ -37,14 +38,16 @@ from plant_fmu import PlantError
 class FusedFlyer:
     """Flies variations of a scenario one after the other, with one plant that is reset before each."""
 
-    def __init__(self, variation: Variation) -> None:
-        self.variation = variation
+    def __init__(self, variation: Variation, own: OwnLaw | None = None) -> None:
+        self.variation, self._own = variation, own
         base = variation.base
         require_fused(base)
         for key, (_, expected) in _fixed_keys(base).items():
             if key in variation.keys:
                 raise RunError(f"{key} varies, expected {expected!r} for flights without a record")
-        if base.law.fmu is None:
+        if own is not None:
+            own.make(base)
+        elif base.law.fmu is None:
             require_builtin_law(base)
         self._open = contextlib.ExitStack()
         self._vehicle = self._open.enter_context(FlownVehicle(base))
@@ -55,16 +58,19 @@ class FusedFlyer:
         for row, (row_values, seed) in enumerate(zip(values, seeds, strict=True)):
             try:
                 scenario = self.variation.scenario(row_values.tolist(), int(seed))
-                metrics, model, data, _ = self._vehicle.fly(scenario)
+                metrics, model, data, _ = self._fly(scenario)
                 outcomes[row], arrivals[row] = _outcome(metrics, model, data), arrivals_of(data.arrivals)
-            except (ScenarioError, PlantError) as error:
+            except (ScenarioError, PlantError, LawError) as error:
                 refused[row] = str(error)
         return BatchResult(outcomes, refused, arrivals)
 
     def fly_one(self, scenario: Scenario, trace: bool = False) -> tuple[NDArray[np.void], Rows]:
         """Fly one scenario of the variation; return its outcome, shape (), and its signals at each control step."""
-        metrics, model, data, signals = self._vehicle.fly(scenario, trace)
+        metrics, model, data, signals = self._fly(scenario, trace)
         return _outcome(metrics, model, data), signals
+
+    def _fly(self, scenario: Scenario, trace: bool = False) -> tuple[FlightMetrics, StepModel, StepData, Rows]:
+        return self._vehicle.fly(scenario, trace, own=self._own.make(scenario) if self._own else None)
 
     def close(self) -> None:
         """Free plant and law. May be called twice."""
@@ -113,12 +119,12 @@ class FlownVehicle:
             raise
 
     def fly(
-        self, scenario: Scenario, trace: bool = False, clock: Integers = NO_CLOCK
+        self, scenario: Scenario, trace: bool = False, clock: Integers = NO_CLOCK, own: Law | None = None
     ) -> tuple[FlightMetrics, StepModel, StepData, Rows]:
-        """Reset all of them, and fly a scenario; return the signals at control steps if a trace is wanted."""
+        """Reset all of them, and fly a scenario with its law, or one's own; return its signals if a trace is wanted."""
         if self._law is not None:
             self._law.restart(scenario)
-        law, plant = self._law or law_of(scenario), self._plant
+        law, plant = own or self._law or law_of(scenario), self._plant
         if isinstance(plant, FmuPlant):
             plant.restart(scenario)
         else:
@@ -148,7 +154,8 @@ class FlownVehicle:
         rows = np.zeros((decisions if trace else 0, signals.row.size))
         metrics = FlightMetrics()
         BoundCall(fly, (model, data, calls, metrics, np.zeros(len(inputs)), rows)).call()
-        for part in (bound_law, rules, self._components):
+        _raise_error(bound_law, float(data.now))
+        for part in (rules, self._components):
             part.raise_error()
         columns = signals.columns
         flown = Rows(columns, {column.name: values for column, values in zip(columns, rows.T, strict=True)})
@@ -163,6 +170,17 @@ class FlownVehicle:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _raise_error(law: BoundLaw, now: float) -> None:
+    """Raise the error of the law's last step; that of a user's Python code as a `LawError`."""
+    try:
+        law.raise_error()
+    except PlantError:
+        raise
+    except Exception as error:
+        text = str(error) if isinstance(error, LawError) else f"{type(error).__name__}: {error}"
+        raise LawError(f"t = {now:.6g} s: {' '.join(text.split())}") from error
 
 
 def _outcome(metrics: FlightMetrics, model: StepModel, data: StepData) -> NDArray[np.void]:

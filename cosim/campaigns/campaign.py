@@ -7,17 +7,19 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
+from controller import Law
 from cosim.campaigns.analysis.campaign_summary import summarize_campaign
 from cosim.campaigns.runner import Campaign, carry_out
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.law_gains import gains_from
+from cosim.campaigns.scenes.law_gains import gains_from, to_law
 from cosim.campaigns.scenes.scene_file import SceneStore
 from cosim.campaigns.scenes.scene_work import SceneTask, SceneWork
+from cosim.scenario.law_factory import OwnLaw
 
 
 def run_campaign(
     scenes: str | Path | SceneStore,
-    law: str,
+    law: str | Law | OwnLaw,
     out: str | Path,
     conditions: Conditions | None = None,
     gains: Any = None,
@@ -31,8 +33,9 @@ def run_campaign(
     ----------
     scenes : str, Path or SceneStore
         File of the scenes with one JSON object per line, ``-`` for standard input; or a store of scenes read before.
-    law : str
-        Name of the law, a key of `controller.LAWS`; or the .fmu file of one, or a scenario's file whose law is an FMU.
+    law : str or Law
+        Name of the law, a key of `controller.LAWS`; the .fmu file of one, or a scenario's file whose law is an FMU;
+        ``"file.py:name"`` of a law, a function, or a class; or a law, such as a `FunctionLaw`. Each flight has a copy.
     out : str or Path
         A folder that does not exist, is empty, or holds the same campaign. A complete one gets its summary again, a
         partial one is continued.
@@ -75,7 +78,8 @@ def run_campaign(
     2
     """
     out = Path(out)
-    task = SceneTask(law, gains_from(law) if gains is None else gains, conditions or Conditions())
+    made = to_law(law)
+    task = SceneTask(made, gains_from(made) if gains is None else gains, conditions or Conditions())
     with contextlib.ExitStack() as stack:
         store = scenes if isinstance(scenes, SceneStore) else stack.enter_context(SceneStore(Path(scenes)))
         work = SceneWork(store, task)

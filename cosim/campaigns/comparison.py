@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from controller import LAWS
+from controller import LAWS, Law
 from cosim.campaigns.analysis.campaign_summary import median, rates_of
 from cosim.campaigns.analysis.statistics import Facts, count_pairs, median_difference
 from cosim.campaigns.campaign import run_campaign
@@ -18,7 +18,7 @@ from cosim.campaigns.pages.comparison_page import NUMBERS, PAGE
 from cosim.campaigns.pages.replays import WORST
 from cosim.campaigns.runner import Campaign
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.law_gains import gains_from
+from cosim.campaigns.scenes.law_gains import gains_from, label_of, to_law
 from cosim.campaigns.scenes.scene_file import SceneStore
 from cosim.campaigns.scenes.scene_work import SceneTask
 from cosim.campaigns.store.results import Results
@@ -26,6 +26,7 @@ from cosim.errors import RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
 from cosim.report.web_page import FIGURES
+from cosim.scenario.law_factory import OwnLaw
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class Comparison:
 
 def compare(
     scenes: str | Path,
-    laws: Sequence[str],
+    laws: Sequence[str | Law | OwnLaw],
     out: str | Path,
     conditions: Conditions | None = None,
     gains: Mapping[str, Any] | None = None,
@@ -62,15 +63,15 @@ def compare(
     ----------
     scenes : str or Path
         File of the scenes with one JSON object per line; ``-`` for standard input.
-    laws : sequence of str
-        Names of two or more laws, keys of `controller.LAWS`.
+    laws : sequence of str or Law
+        Two or more laws, each as for `run_campaign`.
     out : str or Path
         A folder that does not exist, is empty, or holds a comparison of the same scenes. It has the folder of a
         campaign for each law, which is continued.
     conditions : Conditions, optional
         Conditions of the flights; default: those of the score.
     gains : mapping from str to NamedTuple, optional
-        Gains of each law by its name; default: the law's own defaults.
+        Gains of each law by its name or file; default: the law's own defaults.
     workers : int
         Number of processes.
     progress : bool
@@ -97,9 +98,10 @@ def compare(
     >>> sorted(path.name for path in comparison.folder.iterdir() if path.is_dir())
     ['pd', 'sun_cheah']
     """
-    made = {Path(law).name: gains_from(law) for law in laws}  # raises an error for an unknown law
+    of_laws = [to_law(law) for law in laws]
+    made = {label_of(law): gains_from(law) for law in of_laws}  # raises an error for an unknown law
     if len(laws) < 2 or len(made) < len(laws):
-        raise RunError(f"laws are {', '.join(laws) or 'none'}, expected two or more, each once")
+        raise RunError(f"laws are {', '.join(map(str, of_laws)) or 'none'}, expected two or more, each once")
     out, gains, conditions = Path(out), gains or {}, conditions or Conditions()
     refuse_other_files(out, {NUMBERS, PAGE, *LAWS, *made}, "a comparison")
 
@@ -111,8 +113,7 @@ def compare(
             "paired": [paired_differences(one, other, results) for one, other in itertools.combinations(made, 2)],
         }
 
-    of_laws = zip(laws, made.items(), strict=True)
-    tasks = {name: SceneTask(law, gains.get(law) or own, conditions) for law, (name, own) in of_laws}
+    tasks = {label_of(law): SceneTask(law, gains.get(str(law)) or made[label_of(law)], conditions) for law in of_laws}
     return fly_each(Path(scenes), out, tasks, NUMBERS, numbers, workers, progress)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from controller import Law
 from cosim.batch.outcome import FIELDS
 from cosim.campaigns.analysis.campaign_summary import refusal_reasons, worst_table
 from cosim.campaigns.analysis.statistics import Facts, effect, quantiles, rate
@@ -17,6 +18,7 @@ from cosim.campaigns.store.results import Results
 from cosim.campaigns.sweeps.design import Design
 from cosim.campaigns.sweeps.sweep_rows import SweepWork
 from cosim.scenario.key_names import key_name
+from cosim.scenario.law_factory import OwnLaw, own_law, read_law
 from cosim.scenario.scenario import Scenario, to_scenario
 from cosim.simulation.signals import Array
 
@@ -29,6 +31,7 @@ def run_sweep(
     design: Design,
     out: str | Path,
     *,
+    law: str | Law | OwnLaw | None = None,
     workers: int = 1,
     executor: Executor | None = None,
     progress: bool = False,
@@ -44,6 +47,9 @@ def run_sweep(
     out : str or Path
         A folder that does not exist, is empty, or holds the same sweep. A complete one gets its summary again, a
         partial one is continued.
+    law : Law or str, optional
+        Custom law instead of the scenario's: ``"file.py:name"`` of a law, a function, or a class; or a law, such as a
+        `FunctionLaw`. Each flight has a copy.
     workers : int
         Number of processes, which does not change the rows. With an executor: number of batches at the same time.
     executor : concurrent.futures.Executor, optional
@@ -79,7 +85,8 @@ def run_sweep(
     >>> sweep.flown
     2
     """
-    work, out = SweepWork(to_scenario(scenario), design), Path(out)
+    own = read_law(law) if isinstance(law, str) else None if law is None else own_law(law)
+    work, out = SweepWork(to_scenario(scenario), design, own), Path(out)
     return carry_out(work, out, lambda results: summarize_sweep(work, results, out), workers, executor, progress)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from controller import ControllerError
 from controller.regions.region_set import of_attitude
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.law_gains import digest_of_law, gains_of_plan
+from cosim.campaigns.scenes.law_gains import AnyLaw, FmuGains, digest_of_law, gains_of_plan
 from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.scene_rows import SCHEMA
 from cosim.campaigns.scenes.scene_work import SceneTask
@@ -32,6 +32,7 @@ from cosim.results.file_copies import VEHICLE_COPY
 from cosim.results.run_result import SCENARIO, Run
 from cosim.results.spans import spans
 from cosim.run.run_scenario import run_scenario
+from cosim.scenario.law_factory import OwnLaw
 from cosim.scenario.scenario import Scenario, load_scenario
 from cosim.scenario.toml_file import rename_former_keys
 from plant_fmu import PlantError, PlantFmuError
@@ -51,6 +52,7 @@ class Repeat:
     batch: Any  # batch with this row alone
     scenario: Scenario | None  # equivalent to the row; None if the row was refused
     outcome: Callable[[Run], Outcome]  # columns of the row from a recorded run
+    law: OwnLaw | None = None  # Python code that is the law
 
     def differences(self, run: Run) -> dict[str, tuple[Any, Any]]:
         """Return stored and recorded values of the columns that differ by more than rounding; none of a partial run."""
@@ -64,8 +66,8 @@ class Repeat:
         }
 
 
-def repeat_of(folder: Path, key: int) -> Repeat:
-    """Prepare the repetition of a row."""
+def repeat_of(folder: Path, key: int, laws: Sequence[OwnLaw] = ()) -> Repeat:
+    """Prepare the repetition of a row; a law that is Python code is one of those given."""
     plan = read_plan(folder)
     if plan.get("kind") not in (SCENES, SWEEP):
         raise RunError(f"{folder}: holds a campaign of another version, expected one of this")
@@ -81,11 +83,25 @@ def repeat_of(folder: Path, key: int) -> Repeat:
         raise RunError(f"{folder}: row {key} is not flown again: {KILLED}")
     try:
         with understood(folder / PLAN):
-            return (_sweep_repeat if plan["kind"] == SWEEP else _scene_repeat)(folder, plan, stored)
+            repeat = _sweep_repeat if plan["kind"] == SWEEP else _scene_repeat
+            return repeat(folder, plan, stored, _own_law(plan, laws))
     except (CosimError, PlantFmuError, ControllerError) as error:
         if str(folder) in str(error):
             raise
         raise RunError(f"{folder}: row {key}: {error}") from error
+
+
+def _own_law(plan: dict[str, Any], laws: Sequence[OwnLaw]) -> OwnLaw | None:
+    """Return the law of a plan, if it is Python code, which no folder holds."""
+    name = plan["scenario"]["law"]["name"] if plan["kind"] == SWEEP else plan["law"]
+    if ":" not in name or name.endswith((".fmu", ".toml")):
+        return None
+    for law in laws:
+        if law.name == name:
+            if law.digest != plan["law_sha256"]:
+                raise RunError(f"law {name} is not that of the campaign: its code has changed")
+            return law
+    raise RunError(f"law {name} is Python code, which no folder holds, expected --law FILE.py:NAME")
 
 
 def complete_results(folder: Path, schema: Any) -> Results:
@@ -100,8 +116,8 @@ def require_complete(folder: Path) -> None:
         raise RunError(f"{folder}: is not complete, expected a campaign that is; its own command goes on with it")
 
 
-def _sweep_repeat(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
-    work = SweepWork(load_scenario(folder / SCENARIO), design_of(plan))
+def _sweep_repeat(folder: Path, plan: dict[str, Any], stored: dict[str, Any], own: OwnLaw | None) -> Repeat:
+    work = SweepWork(load_scenario(folder / SCENARIO), design_of(plan), own)
     scenario_before = rename_former_keys(plan["scenario"])
     if differences := difference({"scenario": scenario_before}, {"scenario": work.plan["scenario"]}):
         raise RunError(f"{folder / SCENARIO}: is not that of the campaign ({differences})")
@@ -115,21 +131,22 @@ def _sweep_repeat(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) ->
     if stored["refused"] is None:
         scenario = work.variation.scenario(batch.values[0].tolist(), int(batch.seeds[0]))
         scenario = dataclasses.replace(scenario, name=f"{plan['name']}-row-{row}")
-    return Repeat(stored, work.task, batch, scenario, _row_outcome)
+    return Repeat(stored, work.task, batch, scenario, _row_outcome, own)
 
 
-def _scene_repeat(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
-    gains = gains_of_plan(plan)
-    if plan.get("law_sha256") != digest_of_law(plan["law"]).get("law_sha256"):
-        raise RunError(f"{plan['law']}: is not that of the campaign")
+def _scene_repeat(folder: Path, plan: dict[str, Any], stored: dict[str, Any], own: OwnLaw | None) -> Repeat:
+    law: AnyLaw = own or plan["law"]
+    gains = FmuGains() if own else gains_of_plan(plan)
+    if plan.get("law_sha256") != digest_of_law(law).get("law_sha256"):
+        raise RunError(f"{law}: is not that of the campaign")
     conditions: Conditions = decode(plan["conditions"], Conditions, "conditions")
     line = stored["scene"].encode()
     scenario = None
     if stored["refused"] is None:
-        scenario = scene_scenario(decode_scene(line), plan["law"], gains, conditions)
+        scenario = scene_scenario(decode_scene(line), law, gains, conditions)
 
-    task = SceneTask(plan["law"], gains, conditions)
-    return Repeat(stored, task, [line], scenario, lambda run: _scene_outcome(run, conditions))
+    task = SceneTask(law, gains, conditions)
+    return Repeat(stored, task, [line], scenario, lambda run: _scene_outcome(run, conditions), own)
 
 
 def _row_outcome(run: Run) -> Outcome:
@@ -180,9 +197,9 @@ class Rerun:
     stopped: str | None  # error of the plant that stopped the flight, as in the row
 
 
-def rerun(folder: Path, key: int, out: Path | None = None, progress: bool = False) -> Rerun:
+def rerun(folder: Path, key: int, out: Path | None = None, progress: bool = False, law: OwnLaw | None = None) -> Rerun:
     """Fly a row again with its engine, and once more step by step with full record and report."""
-    repeat = repeat_of(folder, key)
+    repeat = repeat_of(folder, key, [law] if law else [])
     flyer = repeat.task.flyer()
     try:
         (again,) = flyer.fly(repeat.batch).to_pylist()
@@ -196,7 +213,7 @@ def rerun(folder: Path, key: int, out: Path | None = None, progress: bool = Fals
     run, apart, stopped = None, {}, None
     if repeat.scenario is not None:
         try:
-            run = run_scenario(repeat.scenario, out, progress=progress)
+            run = run_scenario(repeat.scenario, out, progress=progress, law=repeat.law)
             apart = repeat.differences(run)
         except PlantError as error:
             if repeat.stored["stopped_at"] is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
@@ -17,6 +18,8 @@ from cosim.errors import RunError
 if TYPE_CHECKING:
     from cosim.campaigns.runner import Campaign
     from cosim.campaigns.sweeps.design import Vary
+    from cosim.scenario.law_factory import OwnLaw
+    from cosim.scenario.scenario import Scenario
 
 _SENSING = ("state", "sensors")  # with the scenes' noise; or IMU, DVL, compass, pressure sensor and USBL
 _WORKERS = int_range(1, 1024)
@@ -29,7 +32,7 @@ def add_verbs(verbs: Any) -> None:
         ("campaign scenes.jsonl --law deployable --out campaigns/mine --workers 2",
          "campaign scenes.jsonl --law ismail_dunnigan --set k_p1=10 --out campaigns/stiff"),
     )  # fmt: skip
-    flag(verb, "--law NAME", "such as ismail_dunnigan", required=True)
+    flag(verb, "--law NAME|FILE", "such as ismail_dunnigan; or an .fmu file, or FILE.py:NAME", required=True)
     add_changes(verb, "a gain of the law, such as k_p1=10")
     _add_scenes(verb)
     add_cluster(verb)
@@ -40,7 +43,7 @@ def add_verbs(verbs: Any) -> None:
          "compare scenes.jsonl --ablate --variants net-weight,arbiter-reversed --out ablations/mine"),
     )  # fmt: skip
     compared = verb.add_mutually_exclusive_group(required=True)
-    flag(compared, "--laws A,B[,C]", "two or more, with commas between them")
+    flag(compared, "--laws A,B[,C]", "two or more, with commas between them; each as --law of campaign")
     flag(compared, "--ablate", "compare the deployable law with itself without one part each")
     flag(verb, "--variants A[,B]", "with --ablate: such as net-weight,arbiter-reversed (default: all)")
     add_changes(
@@ -119,6 +122,16 @@ def fly(
     return say_if_interrupted(run, f"what is flown is kept in {options.out}, and the same command goes on")
 
 
+def load_with_law(scenario: str, law: str | None, changes: Sequence[str]) -> tuple[Scenario, OwnLaw | None]:
+    """Load a scenario with the law of ``--law``; return that too if it is Python code."""
+    from cosim.scenario.law_factory import own_law
+    from cosim.scenario.scenario import load_scenario
+
+    own = own_law(law) if law else None
+    key = "file" if law and law.endswith(".fmu") else "name"
+    return load_scenario(scenario, [*([f"law.{key}={law}"] if law and not own else []), *changes]), own
+
+
 def refuse_both(vary: Sequence[Vary], changes: Sequence[str]) -> None:
     """Raise a RunError if a key is set and varies."""
     from cosim.scenario.toml_file import split_change
@@ -132,38 +145,47 @@ def campaign(options: argparse.Namespace) -> int:
     """Run ``cosim campaign``."""
     from cosim.campaigns.campaign import run_campaign
     from cosim.campaigns.pages.campaign_page import campaign_lines, write_campaign_page
-    from cosim.campaigns.scenes.law_gains import gains_from
+    from cosim.campaigns.scenes.law_gains import gains_from, to_law
 
-    gains, conditions = gains_from(options.law, options.set), _conditions(options)
+    law = to_law(options.law)
+    gains, conditions = gains_from(law, options.set), _conditions(options)
 
     def work() -> Campaign:
         with executor_of(options) as executor:
             n, progress = options.workers or 1, not options.quiet
-            return run_campaign(
-                options.scenes, options.law, options.out, conditions, gains, n, executor, progress=progress
-            )
+            return run_campaign(options.scenes, law, options.out, conditions, gains, n, executor, progress=progress)
 
-    return fly(options, work, lambda done: campaign_lines(done.summary), write_campaign_page)
+    page = functools.partial(write_campaign_page, laws=own_laws(law))
+    return fly(options, work, lambda done: campaign_lines(done.summary), page)
+
+
+def own_laws(*laws: object) -> list[OwnLaw]:
+    """Return those laws that are Python code."""
+    from cosim.scenario.law_factory import OwnLaw
+
+    return [law for law in laws if isinstance(law, OwnLaw)]
 
 
 def compare(options: argparse.Namespace) -> int:
     """Run ``cosim compare``."""
     from cosim.campaigns.comparison import compare as compare_laws
     from cosim.campaigns.pages.comparison_page import write_comparison_page
-    from cosim.campaigns.scenes.law_gains import gains_by_law
+    from cosim.campaigns.scenes.law_gains import gains_by_law, to_law
 
     if options.ablate:
         return _ablate(options)
     refuse_flags(options, ["variants"], "--ablate with it")
     laws = [law.strip() for law in options.laws.split(",") if law.strip()]
     gains, conditions = gains_by_law(laws, options.set), _conditions(options)
-    given = options.scenes, laws, options.out, conditions, gains, options.workers
+    made = [to_law(law) for law in laws]
+    given = options.scenes, made, options.out, conditions, gains, options.workers
 
     def lines(done: Any) -> Iterator[str]:
         for law, s in done.numbers["laws"].items():
             yield f"{law}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation"
 
-    return fly(options, lambda: compare_laws(*given, progress=not options.quiet), lines, write_comparison_page)
+    page = functools.partial(write_comparison_page, laws=own_laws(*made))
+    return fly(options, lambda: compare_laws(*given, progress=not options.quiet), lines, page)
 
 
 def _ablate(options: argparse.Namespace) -> int:

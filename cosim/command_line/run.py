@@ -29,6 +29,7 @@ def add_verbs(verbs: Any) -> None:
     add_scenario(verb)
     add_run_folder(verb)
     add_changes(verb, "a key of the scenario, such as law.gains.k_p1=10 or regions.SR1.shape.radius=0.7")
+    flag(verb, "--law NAME|FILE", "law such as pd, an .fmu file, or FILE.py:NAME; instead of the scenario's own")
     flag(verb, "--rate N|max", "most simulated seconds per second (default: max; 1 with --commands or --live)", rate)
     flag(verb, "--json", "print the outcome, and the paths of the files, as JSON")
     flag(verb, "--replay-commands FILE", "repeat the commands.jsonl of an earlier run, with its scenario", Path)
@@ -45,8 +46,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace, stack: contextlib.ExitStack, drawing: FigureProcess | None) -> int:
+    from cosim.command_line.campaigns import load_with_law
     from cosim.run.run_scenario import run_scenario
-    from cosim.scenario.scenario import load_scenario
 
     overrides = [*options.set]
     if options.commands:
@@ -55,13 +56,13 @@ def _run(options: argparse.Namespace, stack: contextlib.ExitStack, drawing: Figu
     if options.await_arm:
         overrides.append("commands.await_arm=true")
     mavlink = _mavlink(options)
-    scenario = load_scenario(options.scenario, overrides)
+    scenario, own = load_with_law(options.scenario, options.law, overrides)
     usual = 1.0 if options.commands or options.live is not None else math.inf
     max_rate = usual if options.rate is None else options.rate
     live = open_live(options, stack)
     done = run_scenario(
         scenario, options.out, mavlink, None if max_rate == math.inf else max_rate, progress=not options.quiet,
-        report=not options.no_report, commands_log=options.replay_commands, live=live, figure_process=drawing,
+        report=not options.no_report, commands_log=options.replay_commands, live=live, law=own, figure_process=drawing,
     )  # fmt: skip
     if options.json:
         print(_json(done), end="")

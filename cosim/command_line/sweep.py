@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import functools
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.campaigns import add_campaign_folder, add_cluster, executor_of, fly, refuse_both
+from cosim.command_line.campaigns import (
+    add_campaign_folder,
+    add_cluster,
+    executor_of,
+    fly,
+    load_with_law,
+    own_laws,
+    refuse_both,
+)  # fmt: skip
 from cosim.command_line.flags import add_changes, add_verb, flag
 from cosim.command_line.process import INTERRUPTED, print_run, print_status, say
 
@@ -25,6 +34,7 @@ def add_verbs(verbs: Any) -> None:
     varied = verb.add_mutually_exclusive_group(required=True)
     flag(varied, "--vary KEY=LOW:HIGH[:N][:log]", "a key and its range, or KEY=A,B,C", nargs="+", action="extend")
     flag(varied, "--vehicles FILE.jsonl", "vehicles that cosim identify has drawn: each is the plant of a row", Path)
+    flag(verb, "--law NAME|FILE", "law such as pd, an .fmu file, or FILE.py:NAME; instead of the scenario's own")
     flag(verb, "--samples N", "number of rows, unless the design is a grid", int)
     flag(verb, "--design grid|random|sobol|lhs|paired", "how rows are spread (default: random; of --vehicles: paired)")
     flag(verb, "--seed S", "seed of the design and the rows", int, 0)
@@ -39,6 +49,7 @@ def add_verbs(verbs: Any) -> None:
     verb.add_argument("folder", type=Path, metavar="DIR", help="the folder of a sweep or campaign")
     verb.add_argument("row", type=int, metavar="ROW", help="number of the row; of a campaign, the seed of the scene")
     flag(verb, "--out RUN", "run folder (default: runs/SCENARIO-row-ROW-TIME)", Path)
+    flag(verb, "--law FILE.py:NAME", "the law of the row, if it is Python code")
 
 
 def sweep(options: argparse.Namespace) -> int:
@@ -46,27 +57,29 @@ def sweep(options: argparse.Namespace) -> int:
     from cosim.campaigns.pages.sweep_page import sweep_lines, write_sweep_page
     from cosim.campaigns.parameter_sweep import run_sweep
     from cosim.campaigns.sweeps.design import Design, vary_from, vary_vehicles
-    from cosim.scenario.scenario import load_scenario
 
     vary = vary_vehicles(options.vehicles) if options.vehicles else vary_from(options.vary)
     kind: Any = options.design or ("paired" if options.vehicles else "random")
     design = Design(vary, kind, options.samples, options.seed)
     refuse_both(design.vary, options.set)
-    scenario = load_scenario(options.scenario, options.set)
+    scenario, own = load_with_law(options.scenario, options.law, options.set)
 
     def work() -> Any:
         with executor_of(options) as executor:
-            n = options.workers or 1
-            return run_sweep(scenario, design, options.out, workers=n, executor=executor, progress=not options.quiet)
+            how: Any = {"workers": options.workers or 1, "executor": executor, "progress": not options.quiet}
+            return run_sweep(scenario, design, options.out, law=own, **how)
 
-    return fly(options, work, lambda done: sweep_lines(done.summary), write_sweep_page)
+    page = functools.partial(write_sweep_page, laws=own_laws(own))
+    return fly(options, work, lambda done: sweep_lines(done.summary), page)
 
 
 def rerun(options: argparse.Namespace) -> int:
     """Run ``cosim rerun``."""
     from cosim.campaigns.rerun import rerun as rerun_row
+    from cosim.scenario.law_factory import read_law
 
-    done = rerun_row(options.folder, options.row, options.out, progress=not options.quiet)
+    law = read_law(options.law) if options.law else None
+    done = rerun_row(options.folder, options.row, options.out, not options.quiet, law)
     if done.other_code:
         print_status("the code is not that which flew the row")
     for name, (before, now) in done.differing.items():

@@ -16,7 +16,7 @@ from cosim.results.run_result import COMMANDS_LOG, Run
 from cosim.results.wording import verdict
 from cosim.run.progress import ProgressBar
 from cosim.run.run_folder import RunFolder, claim, conclude
-from cosim.scenario.law_factory import with_custom_law
+from cosim.scenario.law_factory import OwnLaw, read_law, with_custom_law
 from cosim.scenario.scenario import Scenario, to_scenario
 from cosim.simulation.commands.sources import CommandQueue, LoggedCommands, ReplayedCommands
 from cosim.simulation.master import Master, Observer
@@ -75,7 +75,7 @@ def run_scenario(
     report: bool = True,
     commands_log: str | Path | None = None,
     live: LiveView | None = None,
-    law: Law | None = None,
+    law: Law | OwnLaw | str | None = None,
     overwrite: bool = False,
     figure_process: FigureProcess | None = None,
 ) -> Run:
@@ -102,9 +102,9 @@ def run_scenario(
         Log of commands of an earlier run, which is replayed; link and viewers then cannot send commands.
     live : LiveView, optional
         Shows the run in browsers, and takes their commands if the scenario's commands are enabled.
-    law : Law, optional
-        Custom law, such as a `FunctionLaw`, instead of the scenario's. The run folder holds its name, not its code:
-        repeating the run needs the law again.
+    law : Law or str, optional
+        Custom law instead of the scenario's: a `FunctionLaw`, or ``"file.py:name"`` of a law, a function, or a class.
+        The run folder holds its name, not its code: repeating the run needs the law again.
     overwrite : bool
         Replace the run in `out`; a folder with any other content is refused.
     figure_process : FigureProcess, optional
@@ -138,14 +138,18 @@ def run_scenario(
     0.2
     """
     scenario, out = to_scenario(scenario), None if out is None else Path(out)
-    if law is not None:
-        scenario = with_custom_law(law, scenario)
+    own = read_law(law) if isinstance(law, str) else law if isinstance(law, OwnLaw) else None
+    given = None if isinstance(law, str | OwnLaw) else law
+    if own is not None:
+        scenario = own.in_scenario(scenario)
+    elif given is not None:
+        scenario = with_custom_law(given, scenario)
     replayed = None if commands_log is None else _replayed_commands(scenario, Path(commands_log))
     queue = CommandQueue()
     link: LinkThread | None = None
     try:
         for attempt in itertools.count(1):
-            with Master(scenario, law) as master:
+            with Master(scenario, own.make(scenario) if own else given) as master:
                 if mavlink is not None and link is None:
                     link = mavlink.open(scenario, master.signals.columns, None if replayed else queue, rate)
                 folder = claim(

@@ -23,6 +23,7 @@ from cosim.campaigns.sweeps.design import Design, Vary
 from cosim.campaigns.sweeps.sweep_rows import SweepBatch, SweepWork
 from cosim.campaigns.workers.work import Rows, Work
 from cosim.errors import RunError
+from cosim.scenario.law_factory import OwnLaw
 from cosim.scenario.scenario import Scenario
 from plant_fmu.archive import temporary_folder
 from plant_fmu.toml_tables import hint
@@ -70,8 +71,9 @@ class SceneSearch(Work):
             raise RunError(f"family {family!r} is unknown; {hint(family, FAMILIES)}")
         self._space = SceneSpace(family, None if settings.rare_event else _LIMIT)
         self.dimension, self.horizon = self._space.dimension, task.conditions.duration
-        self.family, self.name, self.settings = family, task.law, settings
+        self.family, self.name, self.settings = family, str(task.law), settings
         self.task = self._task = task
+        self.law = task.law
         self.title = f"The {task.law} law on {family} scenes"
         self.plan = task.plan(settings.budget) | {"search": {"family": family, **settings.table()}}
         self._lines: list[bytes] = []
@@ -104,10 +106,12 @@ class SceneSearch(Work):
 class ScenarioSearch(SweepWork):
     """A search for the worst values of some keys of a scenario."""
 
-    def __init__(self, scenario: Scenario, vary: Sequence[Vary], settings: SearchSettings) -> None:
-        super().__init__(scenario, Design(tuple(vary), "random", settings.budget, settings.seed))
+    def __init__(
+        self, scenario: Scenario, vary: Sequence[Vary], settings: SearchSettings, law: OwnLaw | None = None
+    ) -> None:
+        super().__init__(scenario, Design(tuple(vary), "random", settings.budget, settings.seed), law)
         self.plan = {**self.plan, "search": settings.table()}
-        self.settings, self._scenario, self.title = settings, scenario, scenario.title
+        self.settings, self._scenario, self.title, self.law = settings, scenario, scenario.title, law
         self.dimension, self.horizon = len(vary), scenario.time.duration
         self._values = np.empty((0, self.dimension))
 
@@ -124,4 +128,5 @@ class ScenarioSearch(SweepWork):
 
     def fly_random(self, out: Path, workers: int, progress: bool) -> Results:
         """Fly rows with uniformly drawn values, as many as the budget."""
-        return run_sweep(self._scenario, self.design, out, workers=workers, progress=progress).results
+        how: Any = {"law": self.law, "workers": workers, "progress": progress}
+        return run_sweep(self._scenario, self.design, out, **how).results

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ from cosim.campaigns.store.plan import SCENES
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
 from cosim.report.web_page import interval
+from cosim.scenario.law_factory import OwnLaw
 
 if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure
@@ -28,7 +29,7 @@ FACTS = ("completed", "reached", "violation")  # rates on the page, in this orde
 _DRAWN = ("completed", "violation")  # rates that are drawn over the features of scenes
 
 
-def write_campaign_page(folder: Path, replays: int) -> Path:
+def write_campaign_page(folder: Path, replays: int, laws: Sequence[OwnLaw] = ()) -> Path:
     """Write ``campaign.html`` and its figures, and replays of the worst scenes."""
 
     def compute(summary: dict[str, Any]) -> PageContents:
@@ -46,7 +47,7 @@ def write_campaign_page(folder: Path, replays: int) -> Path:
             [folder], lambda key: f"Scene {key} by the {summary['law']} law",
         )  # fmt: skip
 
-    return write_page_with_replays(folder / PAGE, folder / SUMMARY, compute)
+    return write_page_with_replays(folder / PAGE, folder / SUMMARY, compute, laws)
 
 
 def campaign_lines(summary: dict[str, Any]) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from cosim.campaigns.rerun import complete_results
 from cosim.campaigns.scenes.scene_rows import SCHEMA
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
+from cosim.scenario.law_factory import OwnLaw
 
 if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure
@@ -28,11 +29,11 @@ _SEEN = ("reach_time", "min_clearance")  # columns that are drawn scene by scene
 
 
 def _is_law(name: str) -> bool:
-    """Return True for a law's name, or that of a file without a folder."""
-    return name in LAWS or (Path(name).name == name and Path(name).suffix in (".fmu", ".toml"))
+    """Return True for the name of a law's folder."""
+    return name in LAWS or (Path(name).name == name and "." in name.strip("."))
 
 
-def write_comparison_page(folder: Path, replays: int) -> Path:
+def write_comparison_page(folder: Path, replays: int, laws: Sequence[OwnLaw] = ()) -> Path:
     """Write ``compare.html`` and its figures, and replays of each law's worst scenes, with all laws on one page."""
 
     def compute(numbers: dict[str, Any]) -> PageContents:
@@ -51,7 +52,7 @@ def write_comparison_page(folder: Path, replays: int) -> Path:
             lambda key: f"Scene {key} by {', '.join(results)}",
         )  # fmt: skip
 
-    return write_page_with_replays(folder / PAGE, folder / NUMBERS, compute)
+    return write_page_with_replays(folder / PAGE, folder / NUMBERS, compute, laws)
 
 
 def _drawings(results: Mapping[str, Results], numbers: dict[str, Any]) -> Iterator[NamedFigure]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from cosim.campaigns.pages.replays import PageContents, write_page_with_replays
 from cosim.campaigns.store.folder import SUMMARY
 from cosim.errors import RunError
 from cosim.report.web_page import number
+from cosim.scenario.law_factory import OwnLaw
 
 if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure
@@ -20,7 +21,7 @@ _LABELS = {"clearance": "minimum clearance [m]", "violation": "weighted violatio
 _UNITS = {objective: label[label.index("[") + 1 : -1] for objective, label in _LABELS.items()}
 
 
-def write_falsification_page(folder: Path, replays: int) -> Path:
+def write_falsification_page(folder: Path, replays: int, laws: Sequence[OwnLaw] = ()) -> Path:
     """Write ``falsification.html`` and its figure, and replays of the worst rows."""
 
     def compute(summary: dict[str, Any]) -> PageContents:
@@ -36,7 +37,7 @@ def write_falsification_page(folder: Path, replays: int) -> Path:
         keys = [row["row"] for row in summary["worst"]][:replays]
         return PageContents(values, _drawings(summary), keys, [folder], lambda key: f"{summary['title']}: {key}")
 
-    return write_page_with_replays(folder / PAGE, folder / SUMMARY, compute)
+    return write_page_with_replays(folder / PAGE, folder / SUMMARY, compute, laws)
 
 
 def falsification_lines(summary: dict[str, Any]) -> Iterator[str]:

@@ -20,6 +20,7 @@ from cosim.replay.trace import trace_of
 from cosim.report.web_page import render_page, write_figures
 from cosim.results.run_result import REPLAY, load_run
 from cosim.run.run_scenario import run_scenario
+from cosim.scenario.law_factory import OwnLaw
 from plant_fmu import PlantError
 from plant_fmu.archive import temporary_folder
 
@@ -48,7 +49,9 @@ class PageContents(NamedTuple):
     title: Callable[[int], str]  # title of the replay of a row
 
 
-def write_page_with_replays(path: Path, numbers: Path, compute: Callable[[dict[str, Any]], PageContents]) -> Path:
+def write_page_with_replays(
+    path: Path, numbers: Path, compute: Callable[[dict[str, Any]], PageContents], laws: Sequence[OwnLaw] = ()
+) -> Path:
     """Write a page and its figures, fly rows again, and write the page again with their replays."""
     has_campaign = numbers.name == SUMMARY
     if has_campaign:
@@ -68,7 +71,7 @@ def write_page_with_replays(path: Path, numbers: Path, compute: Callable[[dict[s
                 figures = write_figures(path.parent, contents.drawings)
             write({})
             if shown := {
-                key: replay_of(path.parent, key, contents.folders, contents.title(key)) for key in contents.keys
+                key: replay_of(path.parent, key, contents.folders, contents.title(key), laws) for key in contents.keys
             }:
                 write(shown)
         except OSError as error:
@@ -76,7 +79,7 @@ def write_page_with_replays(path: Path, numbers: Path, compute: Callable[[dict[s
     return path
 
 
-def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Replay:
+def replay_of(out: Path, key: int, folders: Sequence[Path], title: str, laws: Sequence[OwnLaw] = ()) -> Replay:
     """Fly a row of one or several campaigns again, unless done before, and write a page with the flights."""
     target = out / WORST / str(key)
     if not (target / _REMARKS).exists():
@@ -85,7 +88,7 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
             traces, remarks = [], []
             for folder in folders:
                 name = f"{folder.name}: " if len(folders) > 1 else ""
-                trace, remark = _fly_again(repeat_of(folder, key), scratch / "run")
+                trace, remark = _fly_again(repeat_of(folder, key, laws), scratch / "run")
                 traces += [trace | ({"name": folder.name} if name else {})] if trace else []
                 remarks += [name + remark] if remark else []
             if traces:
@@ -107,7 +110,7 @@ def _fly_again(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str
     remark = ""
     try:
         try:
-            run_scenario(repeat.scenario, folder, report=False)
+            run_scenario(repeat.scenario, folder, report=False, law=repeat.law)
         except PlantError as error:
             remark = f"the plant stops: {error}"
         run = load_run(folder)

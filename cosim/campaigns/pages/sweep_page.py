@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ from cosim.campaigns.store.results import Results
 from cosim.campaigns.sweeps.sweep_rows import schema_of
 from cosim.errors import RunError
 from cosim.report.web_page import interval
+from cosim.scenario.law_factory import OwnLaw
 
 if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure
@@ -30,7 +31,7 @@ _MIN_SHARE, _MIN_RHO = 0.01, 0.1  # least effects and rank correlations in the t
 _SHOWN, _VALUES = 8, 12  # maximum numbers of keys in figures and table, and of values listed for a key
 
 
-def write_sweep_page(folder: Path, replays: int) -> Path:
+def write_sweep_page(folder: Path, replays: int, laws: Sequence[OwnLaw] = ()) -> Path:
     """Write ``sweep.html`` and its figures, and replays of the worst rows."""
 
     def compute(summary: dict[str, Any]) -> PageContents:
@@ -51,7 +52,7 @@ def write_sweep_page(folder: Path, replays: int) -> Path:
             lambda key: f"Row {key} of the sweep {summary['name']}",
         )  # fmt: skip
 
-    return write_page_with_replays(folder / PAGE, folder / SUMMARY, compute)
+    return write_page_with_replays(folder / PAGE, folder / SUMMARY, compute, laws)
 
 
 def sweep_lines(summary: dict[str, Any]) -> Iterator[str]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from controller.regions.region_set import name_of
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.law_gains import law_table
+from cosim.campaigns.scenes.law_gains import AnyLaw, label_of, law_table
 from cosim.campaigns.scenes.scenario_scene import AnyScene, ScenarioScene
 from cosim.campaigns.scenes.scene import Scene, plant_parameters, scene_regions
 from cosim.campaigns.scenes.scene_tables import sphere_table
@@ -18,9 +17,9 @@ from cosim.scenario.scenario import Scenario, validate_scenario
 from plant_fmu.vehicle import load_vehicle
 
 
-def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions) -> Scenario:
+def scene_scenario(scene: AnyScene, law: AnyLaw, gains: Any, conditions: Conditions) -> Scenario:
     """Convert a scene to a scenario."""
-    name = f"{Path(law).name}-scene-{scene.seed}"
+    name = f"{label_of(law)}-scene-{scene.seed}"
     if isinstance(scene, ScenarioScene):
         return scene.with_law(law_table(law, gains), name, _changes(scene, conditions))
     vehicle = load_vehicle(scene.vehicle)

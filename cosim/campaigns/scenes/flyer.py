@@ -7,15 +7,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from controller import Law
 from cosim.batch.fused import FlownVehicle
 from cosim.batch.outcome import Arrivals, arrivals_of
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.law_gains import fmu_table, gains_from, law_class
+from cosim.campaigns.scenes.law_gains import fmu_table, gains_from, law_class, to_law
 from cosim.campaigns.scenes.scenario_scene import AnyScene
 from cosim.campaigns.scenes.scene import ODIN
 from cosim.results.file_copies import fmus_of
 from cosim.results.record import Rows
+from cosim.scenario.law_factory import OwnLaw
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_vehicle
 from cosim.scenario.vehicle_model import vehicle_model
@@ -59,8 +61,9 @@ class SceneFlyer:
 
     Parameters
     ----------
-    law : str
-        Name of the law, a key of `controller.LAWS`; or the file of an FMU.
+    law : str or Law
+        Name of the law, a key of `controller.LAWS`; the file of an FMU; ``"file.py:name"``; or a law, such as a
+        `FunctionLaw`, of which each flight has a copy.
     conditions : Conditions
         Conditions of all flights.
     gains : NamedTuple, optional
@@ -88,14 +91,15 @@ class SceneFlyer:
     True
     """
 
-    def __init__(self, law: str, conditions: Conditions | None = None, gains: Any = None) -> None:
-        self.law = law
+    def __init__(self, law: str | Law | OwnLaw, conditions: Conditions | None = None, gains: Any = None) -> None:
+        self.law = to_law(law)
         self.conditions = conditions or Conditions()
-        self.gains = gains_from(law) if gains is None else gains
+        self.gains = gains_from(self.law) if gains is None else gains
         vehicle = load_vehicle(ODIN)
-        if fmu_table(law) is None:
+        if isinstance(self.law, str) and fmu_table(self.law) is None:
             model, level = vehicle_model(vehicle), np.array(_LEVEL)
-            law_class(law).for_vehicle(model, self.gains, level, self.conditions.control, 0)  # refuses invalid gains
+            # refuses invalid gains
+            law_class(self.law).for_vehicle(model, self.gains, level, self.conditions.control, 0)
         cached_fmu(vehicle, 3)  # raises an error if there is none
         self._clock = Clock()
         self._vehicles: dict[tuple[str, ...], FlownVehicle] = {}  # by vehicle and other FMUs
@@ -117,13 +121,14 @@ class SceneFlyer:
 
         Raises
         ------
-        ScenarioError, PlantError
-            If the plant refuses the scene. The flyer can then fly another one.
+        ScenarioError, PlantError, LawError
+            If the plant, or a custom law, refuses the scene. The flyer can then fly another one.
         BuildError
             If there is no FMU of its vehicle.
         """
         scenario = scene_scenario(scene, self.law, self.gains, self.conditions)
-        metrics, _, data, signals = self._vehicle(scenario).fly(scenario, trace, self._clock.numbers)
+        own = self.law.make(scenario) if isinstance(self.law, OwnLaw) else None
+        metrics, _, data, signals = self._vehicle(scenario).fly(scenario, trace, self._clock.numbers, own)
         return self._score(metrics, scenario)._replace(arrivals=arrivals_of(data.arrivals)), signals
 
     def _vehicle(self, scenario: Scenario) -> FlownVehicle:

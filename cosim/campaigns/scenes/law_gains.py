@@ -1,4 +1,4 @@
-"""A law by its name or the file of its FMU, and its gains from texts such as ``k_p1=10``."""
+"""A law by its name, the file of its FMU, or Python code, and its gains from texts such as ``k_p1=10``."""
 
 from __future__ import annotations
 
@@ -9,18 +9,34 @@ from typing import Any
 
 from controller import LAWS
 from cosim.errors import RunError
+from cosim.scenario.law_factory import OwnLaw, own_law
 from cosim.scenario.toml_file import flatten, read_table
 from plant_fmu.toml_tables import hint
 
+AnyLaw = str | OwnLaw  # name, file of an FMU or of its scenario, or Python code
+
 
 class FmuGains(dict[str, Any]):
-    """Parameters of an FMU that is the law, in place of gains."""
+    """Parameters of an FMU that is the law, or nothing for Python code, in place of gains."""
 
     _asdict = dict[str, Any].copy
 
 
-def fmu_table(law: str) -> dict[str, Any] | None:
-    """Return the table ``law`` for an FMU's file, or that of a scenario's file whose law is an FMU; None for a name."""
+def to_law(law: object) -> AnyLaw:
+    """Return a law of a campaign from what a caller passes: a name, a file, ``file.py:name``, or a law."""
+    own = own_law(law)
+    return own or str(law)
+
+
+def label_of(law: AnyLaw) -> str:
+    """Return the name of a law in names of files."""
+    return law.label if isinstance(law, OwnLaw) else Path(law).name
+
+
+def fmu_table(law: AnyLaw) -> dict[str, Any] | None:
+    """Return the table ``law`` for an FMU's file, or that of a scenario's file whose law is an FMU; None for others."""
+    if isinstance(law, OwnLaw):
+        return None
     if law.endswith(".fmu"):
         return {"file": law}
     if law.endswith(".toml"):
@@ -31,16 +47,18 @@ def fmu_table(law: str) -> dict[str, Any] | None:
     return None
 
 
-def law_table(law: str, gains: Any) -> dict[str, Any]:
+def law_table(law: AnyLaw, gains: Any) -> dict[str, Any]:
     """Return the table ``law`` of a scenario for a law and its gains."""
     table = fmu_table(law)
     if table is None:
-        return {"name": law, "gains": gains._asdict()}
+        return {"name": str(law), "gains": gains._asdict()}
     return table | {"parameters": flatten(table.get("parameters", {})) | gains._asdict()}
 
 
-def digest_of_law(law: str) -> dict[str, str]:
-    """Return the digest of the FMU that is the law, as an entry of a plan; none for a name."""
+def digest_of_law(law: AnyLaw) -> dict[str, str]:
+    """Return the digest of the FMU or the code that is the law, as an entry of a plan; none for a name."""
+    if isinstance(law, OwnLaw):
+        return {"law_sha256": law.digest}
     table = fmu_table(law)
     if table is None:
         return {}
@@ -59,12 +77,16 @@ def gains_of_plan(plan: dict[str, Any]) -> Any:
 def law_class(name: str) -> Any:
     """Return the class of a law."""
     if name not in LAWS:
-        raise RunError(f"law {name!r} is unknown; {hint(name, LAWS)}, or the .fmu file of one")
+        raise RunError(f"law {name!r} is unknown; {hint(name, LAWS)}, or the .fmu file of one, or FILE.py:NAME")
     return LAWS[name]
 
 
-def gains_from(law: str, settings: Sequence[str] = ()) -> Any:
+def gains_from(law: AnyLaw, settings: Sequence[str] = ()) -> Any:
     """Return the gains of a law with settings applied."""
+    if isinstance(law, OwnLaw):
+        if settings:
+            raise RunError(f"--set {settings[0]}: law {law} is Python code, which has no gains; expected none")
+        return FmuGains()
     of_fmu = fmu_table(law) is not None
     gains: Any = FmuGains() if of_fmu else law_class(law).gains_type()
     for text in settings:
@@ -81,11 +103,11 @@ def gains_from(law: str, settings: Sequence[str] = ()) -> Any:
 
 
 def gains_by_law(laws: Sequence[str], settings: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the gains of several laws with settings applied."""
+    """Return the gains of several laws, given as texts, with settings applied."""
     by_law: dict[str, list[str]] = {law: [] for law in laws}
     for text in settings:
         law, dot, rest = text.strip().partition(".")
         if not dot or law not in by_law:
             raise RunError(f"--set {text!r}: expected LAW.KEY=VALUE with one of {', '.join(laws)}")
         by_law[law].append(rest)
-    return {law: gains_from(law, of_law) for law, of_law in by_law.items()}
+    return {law: gains_from(to_law(law), of_law) for law, of_law in by_law.items()}

@@ -8,9 +8,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from controller import LawError
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer
-from cosim.campaigns.scenes.law_gains import digest_of_law
+from cosim.campaigns.scenes.law_gains import AnyLaw, digest_of_law
 from cosim.campaigns.scenes.scene_file import SceneStore, decode_scene
 from cosim.campaigns.scenes.scene_rows import SCHEMA, refused_row, row_of, table_of
 from cosim.campaigns.store.plan import SCENES, code_digest, versions
@@ -23,7 +24,7 @@ from plant_fmu import PlantError
 class SceneTask:
     """The data that all scenes of a campaign share."""
 
-    law: str
+    law: AnyLaw
     gains: Any  # NamedTuple of the law's gains_type
     conditions: Conditions
 
@@ -36,7 +37,7 @@ class SceneTask:
         conditions = msgspec.to_builtins(self.conditions)
         return {
             "kind": SCENES,
-            "law": self.law,
+            "law": str(self.law),
             "gains": self.gains._asdict(),
             **digest_of_law(self.law),
             "conditions": conditions | {"outages": list(conditions["outages"])},  # as JSON is read
@@ -60,7 +61,7 @@ class SceneBatches:
             scene, text = decode_scene(line), line.decode().strip()
             try:
                 score, _ = self._flyer.fly(scene)
-            except (PlantError, ScenarioError) as error:
+            except (PlantError, ScenarioError, LawError) as error:
                 rows.append(refused_row(scene.seed, str(error), text))
             else:
                 rows.append(row_of(scene.seed, score, self._flyer.conditions.plant_step, text))
@@ -73,7 +74,7 @@ class SceneWork(Work):
     unit, schema = "scene", SCHEMA
 
     def __init__(self, store: SceneStore, task: SceneTask) -> None:
-        self.name, self.task = task.law, task
+        self.name, self.task = str(task.law), task
         self.plan = {**task.plan(len(store)), "scenes_sha256": store.digest}
         self._store = store
         self._seeds = np.array(store.seeds, dtype=np.int64)

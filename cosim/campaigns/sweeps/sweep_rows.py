@@ -21,6 +21,7 @@ from cosim.campaigns.sweeps.design import Design
 from cosim.campaigns.workers.work import Rows, Work
 from cosim.errors import RunError
 from cosim.results.file_copies import VEHICLE_COPY, files_of, table_of_files
+from cosim.scenario.law_factory import OwnLaw
 from cosim.scenario.scenario import Scenario
 
 _TYPES = {np.bool_: pa.bool_(), np.float64: pa.float64()}
@@ -68,6 +69,7 @@ class SweepTask:
 
     variation: Variation = field(compare=False)
     engine: type[FusedFlyer]
+    law: OwnLaw | None = None  # Python code, instead of the scenario's law
     mark: str = field(default_factory=lambda: secrets.token_hex(16))  # random identity of the task across processes
 
     def flyer(self) -> SweepFlyer:
@@ -79,7 +81,7 @@ class SweepFlyer:
     """Flies batches of a sweep by the fused loop."""
 
     def __init__(self, task: SweepTask) -> None:
-        self._keys, self._engine = task.variation.keys, task.engine(task.variation)
+        self._keys, self._engine = task.variation.keys, task.engine(task.variation, task.law)
         self.close = self._engine.close
 
     def fly(self, batch: SweepBatch) -> Any:
@@ -92,7 +94,8 @@ class SweepWork(Work):
 
     unit = "row"
 
-    def __init__(self, scenario: Scenario, design: Design) -> None:
+    def __init__(self, scenario: Scenario, design: Design, law: OwnLaw | None = None) -> None:
+        scenario = law.in_scenario(scenario) if law else scenario
         keys = tuple(vary.key for vary in design.vary)
         self.variation = Variation(scenario, keys)
         for vary in design.vary:
@@ -101,7 +104,7 @@ class SweepWork(Work):
                     f"{vary.key} is a whole number, expected {vary.key}=A,B,C, or a grid that meets no others"
                 )
         self.name, self.design = scenario.name, design
-        self.task = SweepTask(self.variation, FusedFlyer)
+        self.task = SweepTask(self.variation, FusedFlyer, law)
         self.schema = schema_of(keys)
         self.files = files_of(scenario)
         table = table_of_files(scenario)
@@ -112,6 +115,7 @@ class SweepWork(Work):
             # NaN and infinity as text
             "scenario": json.loads(json.dumps(table), parse_constant=lambda text: repr(float(text))),
             "vehicle_sha256": sha256(self.files.get(VEHICLE_COPY, b"")).hexdigest(),
+            **({"law_sha256": law.digest} if law else {}),
             "code_sha256": code_digest(),
             "versions": versions(),
         }
