@@ -41,7 +41,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
     def runs(item: pytest.Item) -> bool:
         medium, function = item.get_closest_marker("medium"), item.nodeid.partition("[")[0]
-        if "slow" not in item.keywords:
+        if item.get_closest_marker("slow") is None:
             if medium is None:
                 return True
             if fast[function] < medium.kwargs.get("fast", 0):
