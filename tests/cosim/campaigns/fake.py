@@ -23,7 +23,7 @@ class Fake:
     row_time = 0.0  # s
     refused_above = np.inf  # of the first value
 
-    def __init__(self, variation):
+    def __init__(self, variation, own=None):
         self.variation = variation
 
     def fly(self, values, seeds):
@@ -66,7 +66,7 @@ class Poisoned(Fake):
 
 
 class Unfit(Fake):
-    def __init__(self, variation):
+    def __init__(self, variation, own=None):
         raise RunError("the engine cannot fly this")
 
 
