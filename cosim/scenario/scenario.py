@@ -18,10 +18,9 @@ from controller.regions.region_set import shape_center, shape_entry
 from controller.regions.shape import Shape
 from controller.restoring import parameters
 from cosim.errors import ScenarioError
-from cosim.scenario.arbiter_rules import ArbiterRules, check_rules, read_rules
+from cosim.scenario.arbiter_rules import ArbiterRules, check_rules, read_rules, with_crossing_costs
 from cosim.scenario.changes import changed_keys, differing_keys, join_keys, shown_title, with_values
 from cosim.scenario.criteria import PAPER, CriterionSetup, check_criteria, check_criteria_of_regions, fill_criteria
-from cosim.scenario.crossing_costs import with_crossing_costs
 from cosim.scenario.fmu_tables import UserFmu
 from cosim.scenario.goal_mission import Mission, make_mission
 from cosim.scenario.keys import comments, hint_of_key, without_defaults

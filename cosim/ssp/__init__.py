@@ -2,7 +2,7 @@
 
 Plant, controller and arbiter as three FMUs in one SSP 1.0 file, which other masters run without Python.
 
-Imports: controller, fuzzy_arbiter, plant_fmu, scenario, simulation, step.
+Imports: controller, fuzzy_arbiter, plant_fmu, results, scenario, simulation, step.
 """
 
 from cosim.ssp.arbiter import arbiter_component

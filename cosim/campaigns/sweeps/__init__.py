@@ -2,5 +2,5 @@
 
 Designs that choose the values, and their rows.
 
-Imports: batch, campaigns.store, campaigns.workers, scenario.
+Imports: batch, campaigns.store, campaigns.workers, results, scenario.
 """
