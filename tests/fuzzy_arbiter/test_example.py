@@ -87,7 +87,8 @@ def test_manual_definitions_match_their_code():
         for statement in ast.parse(block).body:  # its expressions are compared with what they show where all pages are
             if not isinstance(statement, ast.Expr):
                 exec(compile(ast.Module([statement], []), "arbiter.md", "exec"), names)
-    (of_criteria,) = (reads(text, "toml") for text in re.findall(r"```toml\n(.*?)```", MANUAL, re.S))
+    own_file, of_criteria = (reads(text, "toml") for text in re.findall(r"```toml\n(.*?)```", MANUAL, re.S))
+    assert [output.name for output in own_file.outputs] == ["sail"]
     assert of_criteria == names["arbiter"].system
     assert names["system"] == TIPPING
     poor = names["service"]["poor"]
