@@ -117,7 +117,7 @@ def test_a_damaged_chunk_is_a_gap(tmp_path, imported):
 @pytest.mark.parametrize(
     ("messages", "what"),
     [
-        ([], "needs a column map"),
+        ([], "holds no message, expected a bag with messages"),
         ([("services/x/log", b"{}")], "needs a column map"),
         ([("mavlink/out", b"{}")], "holds no heartbeat of an autopilot, expected a recording of a vehicle"),
         ([("mavlink/1/1/HEARTBEAT", b'{"HEARTBEAT": ')], "holds no heartbeat of an autopilot"),

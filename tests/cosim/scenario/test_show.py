@@ -17,7 +17,7 @@ from cosim.scenario.toml_file import list_scenarios
 from cosim.scenario.toml_text import scenario_text
 from plant_fmu import load_vehicle
 
-WITHOUT_UNIT = {"quaternion", "normal", "axis", "camera_axis"}
+WITHOUT_UNIT = {"axes", "file", "quaternion", "normal", "axis", "camera_axis"}
 
 
 @pytest.fixture
