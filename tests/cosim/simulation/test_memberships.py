@@ -163,7 +163,7 @@ def test_division_and_power_errors_follow_numpy(a, b):
         ({"singleton": [0.5]}, r"clearance: singleton \[0.5\] jumps, expected a change without jumps"),
         ({"s_shape": [0.5, 0.5]}, r"clearance: s_shape \[0.5, 0.5\] jumps"),
         ({"gaussian": [0.5, 0.0]}, "clearance: gaussian of mean, deviation: .* expected a deviation other than 0"),
-        ({"gaussian": [0.5]}, "clearance.gaussian: got a list, expected a list of 2 numbers"),
+        ({"gaussian": [0.5]}, "clearance.gaussian: got a list of 1, expected a list of 2 numbers"),
         ({"formula": "x"}, "clearance: expression 'x' gives 2 at x = 2, expected at most 1"),
         ({"formula": "q"}, "clearance is a value, expected a membership function"),
         ({"formula": "0.5 * tanh(x)"}, "clearance: the function 'tanh', expected of pow, abs, .*; arbiter.file takes"),
