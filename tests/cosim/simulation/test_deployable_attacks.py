@@ -83,6 +83,7 @@ def assert_sound(law, forces):
             "report.bound",
             "report.drag",
             "report.thrust_limit",
+            "attitude.target",
             "speed_limit",
             "thrusters.stuck",
         ):
