@@ -20,6 +20,7 @@ from controller.quaternion import down_in_body
 from controller.regions import Mesh, Points, Region, Sphere
 from controller.regions.region_set import of_attitude
 from controller.regions.shape import Shape
+from controller.regions.shapes import ENTRIES
 from cosim.errors import ScenarioError
 from cosim.scenario.fmu_tables import ComponentEntry, FmuTable, UserFmu
 from cosim.scenario.goal_mission import GoalMotion, Mission
@@ -50,7 +51,8 @@ def check_goal(file: File) -> tuple[Shape, GoalMotion]:
         return Sphere(PARKED_POSITION, 1.0), GoalMotion()
     if not file.goal:
         raise ScenarioError("goal is missing, expected a shape")
-    beside = GoalMotion.__struct_fields__
+    own = ENTRIES[kind].units if isinstance(kind := file.goal.get("type"), str) and kind in ENTRIES else ()
+    beside = [key for key in GoalMotion.__struct_fields__ if key not in own]  # the feature of a cone is the shape's
     table = {key: value for key, value in file.goal.items() if key not in beside}
     shape: Shape = decode(table, AnyShape, "goal").shape
     _require(not of_attitude(shape), "goal.type", repr(table["type"]), "a shape in space")

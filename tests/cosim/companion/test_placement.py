@@ -104,10 +104,14 @@ def test_a_distance_sensor_contradicts_a_scene_that_is_off(fraction, rotation, q
     else:
         direction = np.array([0.0, 0.0, sign])
     free = float(direction @ np.array([0.0, 0.0, 2.0]) + np.abs(direction) @ [5.0, 3.0, 2.0] - direction @ position)
-    found = Placement(POOL).contradictions(position, quaternion, {rotation: free + error, 12: 1.0}).get(rotation, "")
-    assert bool(found) == (not -0.5 < error < 1.1)
+    contradiction = (
+        Placement(POOL).contradictions(position, quaternion, {rotation: free + error, 12: 1.0}).get(rotation, "")
+    )
+    assert bool(contradiction) == (not -0.5 < error < 1.1)
     assert (
-        not found or f"{free:.1f}" in found or float(re.findall(r"[\d.]+", found)[0]) == pytest.approx(free, abs=0.01)
+        not contradiction
+        or f"{free:.1f}" in contradiction
+        or float(re.findall(r"[\d.]+", contradiction)[0]) == pytest.approx(free, abs=0.01)
     )
 
 
@@ -187,5 +191,5 @@ def test_position_and_distances_are_shown_before_the_vehicle_is_armed(tmp_path):
 def test_dry_run_on_a_bench_elsewhere_goes_on_and_says_so(tmp_path):
     link = StandIn(profile="generic")
     run, notes = fly(link, tmp_path / "run", SceneOrigin(geodetic=(51.0, 4.0)), dry_run=True, arm=False)
-    assert run.summary["status"] == "completed"
+    assert run.summary["status"] == "dry run"
     assert "km from everything in it" in notes[-1][2]

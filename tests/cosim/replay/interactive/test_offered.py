@@ -94,7 +94,8 @@ FLIGHTS = {
     "wrench": lambda: flight_of("paper", ["arbiter.engine=closed"]),
     "every shape": lambda: flight_of("docking", regions=regions_of_every_shape(), intersection=[]),
     **{f"goals, {name}": lambda shape=shape: flight_of("docking", goal=shape | {"then": THEN})
-       for name, shape in shapes().items() if name not in ("orientation", "visibility")},
+       for name, shape in shapes().items() if name not in ("orientation", "visibility", "mesh", "points")},
+    "goals, mesh": lambda: flight_of("docking", goal=shapes()["mesh"] | {"then": THEN, "offset": -0.2}),
 }  # fmt: skip
 
 
@@ -117,7 +118,9 @@ def test_numbers_that_a_page_writes_are_those_of_the_changed_scenario(case, aske
         if is_center and shape_entry(flight.scenario.goal).center is None:
             continue  # rounds displacements in the record of a moving goal alone
         is_kept = array.dtype == np.float64 and array is not flight.noise and array is not flight.rows
-        assert same(written(array, memory, job) if is_kept else array, changed)
+        got = written(array, memory, job) if is_kept else array
+        # points of rings are sums, whose order is another one in the page
+        assert same(got, changed) or (array is flight.model.mission.centers and np.abs(got - changed).max() < 1e-12)
         if is_kept:
             kept |= set(range(memory.keep(array), memory.keep(array) + array.size))
     assert {index for index, _ in job["numbers"]} <= kept
