@@ -28,7 +28,7 @@ from controller.compiling.library import is_trusted, write_atomic
 from controller.errors import RegionError
 from controller.regions.geometry import clamp
 from controller.regions.numbers import LENGTH, SIZE, Number, vector
-from controller.regions.shape import GREATEST, Array, Bounds, Evaluation, require
+from controller.regions.shape import GREATEST, Array, Bounds, Evaluation, Vector3, require
 from controller.regions.triangle_mesh import Mesh
 
 MAX_NODES = 4_000_000
@@ -101,6 +101,29 @@ class DistanceGrid(NamedTuple):
         index = np.full(tuple(cells), -1)
         index[crossed] = np.arange(len(places))
         return Mesh(vertices, _faces(values, index))
+
+
+class OnGrid:
+    """What shapes from files share: all is read from a grid, whose frame is at `position` [m, NED]."""
+
+    position: Vector3  # m, NED
+
+    @property
+    def grid(self) -> DistanceGrid:
+        """Distances about the body, whose file is read when they are first needed."""
+        raise NotImplementedError
+
+    def packed(self) -> tuple[float, ...]:
+        """Return position, first node, spacing, number of nodes, level, border, and distances."""
+        return self.grid.packed(self.position)
+
+    def numbers(self) -> tuple[Number, ...]:
+        """Return name and unit of each number of `packed`."""
+        return self.grid.numbers()
+
+    def bounds(self) -> Bounds:
+        """Return the corners of the upright box about the grid."""
+        return self.grid.bounds(self.position)
 
 
 def _faces(values: Array, index: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -6,6 +6,7 @@ import hashlib
 import importlib
 import struct
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -27,16 +28,15 @@ _DAMAGED = (
     MemoryError, ZeroDivisionError,
 )  # fmt: skip
 _LIBRARIES = ("libigl>=2.6", "rtree>=1.3", "trimesh>=4.5")
-_PAIRS_AT_A_TIME = 200_000
+_EDGES_AT_A_TIME = 4_000
 _CROSSED = 1e-9  # fraction of an edge or a triangle, by which a crossing is inside both
 
 
-def read_solid(path: Path) -> Mesh:
-    """Read a closed surface, oriented outward, in the file's own units and axes."""
+def parse_solid(path: Path, data: bytes) -> Mesh:
+    """Parse a closed surface, in the file's own units and axes; the result is oriented outward."""
     trimesh = _library("trimesh")
-    data = read_bounded(path, FORMATS)
     try:
-        loaded = trimesh.load(path, file_type=path.suffix[1:].lower(), force="mesh", skip_materials=True)
+        loaded = trimesh.load(BytesIO(data), file_type=path.suffix[1:].lower(), force="mesh", skip_materials=True)
         far = not (np.abs(loaded.vertices) <= _MAX_COORDINATE).all()
         _require(path, not far, "coordinates that are not finite or too great", f"numbers up to {_MAX_COORDINATE:g}")
         loaded.merge_vertices(merge_tex=True, merge_norm=True)
@@ -102,9 +102,9 @@ def _require_closed(path: Path, vertices: Array, loaded: Any) -> None:
     open_edges = edges[counts != 2]
     if len(open_edges):
         a, b = vertices[open_edges[0]]
-        what = "open" if (counts == 1).any() else "an edge of more than two triangles"
+        what = "is open" if counts[counts != 2][0] == 1 else "has more than two triangles at an edge"
         raise RegionError(
-            f"{path}: the surface is {what} between {_place(a)} and {_place(b)} in the file's units "
+            f"{path}: the surface {what} between {_place(a)} and {_place(b)} in the file's units "
             f"({len(open_edges)} such edges), expected a closed surface"
         )
 
@@ -138,8 +138,8 @@ def _near_pairs(loaded: Any) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int
     """Yield indices of edges and triangles whose upright boxes meet."""
     tree = _library("trimesh").triangles.bounds_tree(loaded.triangles)
     ends = loaded.vertices[loaded.edges_unique]
-    for first in range(0, len(ends), _PAIRS_AT_A_TIME // 50):
-        part = ends[first : first + _PAIRS_AT_A_TIME // 50]
+    for first in range(0, len(ends), _EDGES_AT_A_TIME):
+        part = ends[first : first + _EDGES_AT_A_TIME]
         triangles, counts = tree.intersection_v(part.min(axis=1), part.max(axis=1))
         yield first + np.repeat(np.arange(len(part)), counts.astype(int)), triangles.astype(np.int64)
 

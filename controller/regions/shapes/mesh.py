@@ -9,17 +9,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from controller.regions.distance_grid import DistanceGrid, distance_grid, make_grid
+from controller.regions.distance_grid import DistanceGrid, OnGrid, distance_grid, make_grid
 from controller.regions.entry import Entry
 from controller.regions.file_frame import file_to_ned, require_frame
-from controller.regions.numbers import Number
 from controller.regions.shape import Bounds, Vector3, require, require_finite
-from controller.regions.solid_file import FORMATS, digest, file_version, read_bounded, read_solid, signed_distances
+from controller.regions.solid_file import FORMATS, digest, file_version, parse_solid, read_bounded, signed_distances
 from controller.regions.triangle_mesh import Mesh as Triangles
 
 
 @dataclass(frozen=True)
-class Mesh:
+class Mesh(OnGrid):
     """All points within `offset` [m] of a solid from a file, STL or OBJ; g is the signed distance [m].
 
     `axes` says where the file's x, y and z point. A length of the file times `scale` is in meters; the file's origin is
@@ -58,31 +57,19 @@ class Mesh:
         """Return by how much the region differs from the solid grown by the offset [m]."""
         return self.grid.error(self.offset)
 
-    def packed(self) -> tuple[float, ...]:
-        """Return position, first node, spacing, number of nodes, level, and distances."""
-        return self.grid.packed(self.position)
-
-    def numbers(self) -> tuple[Number, ...]:
-        """Return name and unit of each number of `packed`."""
-        return self.grid.numbers()
-
-    def bounds(self) -> Bounds:
-        """Return the corners of the upright box about the grid."""
-        return self.grid.bounds(self.position)
-
 
 @functools.lru_cache(maxsize=16)
 def _solid(
     file: str, modified: int, size: int, axes: str, scale: float, offset: float, spacing: float
 ) -> tuple[Triangles, DistanceGrid]:
     path = Path(file)
-    key = digest(read_bounded(path, FORMATS))
-    solid = read_solid(path)
+    data = read_bounded(path, FORMATS)
+    solid = parse_solid(path, data)
     turn = file_to_ned(axes)
     placed = Triangles(np.ascontiguousarray(scale * solid.vertices @ turn.T), solid.triangles)
     body = placed.vertices.min(axis=0), placed.vertices.max(axis=0)
     distances = functools.partial(signed_distances, path, placed)
-    return placed, make_grid("mesh", f"{key} {axes} {scale!r}", distances, body, offset, spacing)
+    return placed, make_grid("mesh", f"{digest(data)} {axes} {scale!r}", distances, body, offset, spacing)
 
 
 def surface(shape: Mesh, limits: Bounds) -> Triangles:

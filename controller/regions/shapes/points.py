@@ -10,10 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from controller.errors import RegionError
-from controller.regions.distance_grid import DistanceGrid, distance_grid, make_grid
+from controller.regions.distance_grid import DistanceGrid, OnGrid, distance_grid, make_grid
 from controller.regions.entry import Entry
 from controller.regions.file_frame import file_to_ned, require_frame
-from controller.regions.numbers import Number
 from controller.regions.shape import Array, Bounds, Vector3, require, require_finite
 from controller.regions.solid_file import digest, file_version, read_bounded
 from controller.regions.triangle_mesh import Mesh
@@ -23,7 +22,7 @@ _MAX_POINTS = 1_000_000
 
 
 @dataclass(frozen=True)
-class Points:
+class Points(OnGrid):
     """All points within `radius` [m] of one of a file's points, CSV, TXT or XYZ; g is the signed distance [m].
 
     A row has x, y and z, whose directions are `axes`; columns beyond these are not used. A length of the file times
@@ -65,24 +64,12 @@ class Points:
         """Return by how much the region is larger than the balls [m]."""
         return self.grid.error(self.radius)
 
-    def packed(self) -> tuple[float, ...]:
-        """Return position, first node, spacing, number of nodes, level, and distances."""
-        return self.grid.packed(self.position)
-
-    def numbers(self) -> tuple[Number, ...]:
-        """Return name and unit of each number of `packed`."""
-        return self.grid.numbers()
-
-    def bounds(self) -> Bounds:
-        """Return the corners of the upright box about the grid."""
-        return self.grid.bounds(self.position)
-
 
 @functools.lru_cache(maxsize=16)
 def _grid(file: str, modified: int, size: int, axes: str, scale: float, radius: float, spacing: float) -> DistanceGrid:
     path = Path(file)
-    key = digest(read_bounded(path, _FORMATS))
-    points = np.ascontiguousarray(scale * _read_points(path) @ file_to_ned(axes).T)
+    data = read_bounded(path, _FORMATS)
+    points = np.ascontiguousarray(scale * _parse_points(path, data) @ file_to_ned(axes).T)
 
     def distances(nodes: Array) -> Array:
         from scipy.spatial import cKDTree  # takes a third of a second to import
@@ -90,20 +77,20 @@ def _grid(file: str, modified: int, size: int, axes: str, scale: float, radius: 
         return np.asarray(cKDTree(points).query(nodes)[0])
 
     body = points.min(axis=0), points.max(axis=0)
-    return make_grid("points", f"{key} {axes} {scale!r}", distances, body, radius, spacing)
+    return make_grid("points", f"{digest(data)} {axes} {scale!r}", distances, body, radius, spacing)
 
 
-def _read_points(path: Path) -> Array:
-    """Read positions, shape (n, 3), in the file's units and axes."""
+def _parse_points(path: Path, data: bytes) -> Array:
+    """Parse positions, shape (n, 3), in the file's units and axes."""
     try:
-        lines = path.read_text(encoding="utf-8-sig").replace(",", " ").replace(";", " ").splitlines()
+        lines = data.decode("utf-8-sig").replace(",", " ").replace(";", " ").splitlines()
         if lines and not _is_row(lines[0]):
             lines = lines[1:]  # names of columns
         if not lines:
             raise ValueError("no rows")
         rows = np.loadtxt(lines, ndmin=2, usecols=(0, 1, 2))
         points = np.asarray(rows, dtype=float)
-    except (OSError, ValueError, MemoryError) as error:
+    except (ValueError, MemoryError) as error:
         raise RegionError(f"{path}: cannot be read as rows of x, y and z: {error}") from error
     if points.ndim != 2 or points.shape[1] < 3 or not 1 <= len(points) <= _MAX_POINTS:
         raise RegionError(f"{path}: has the shape {points.shape}, expected 1 to {_MAX_POINTS:,} rows of x, y and z")
