@@ -93,9 +93,9 @@ class Records(Generic[Record]):
                         yield cast(Record, parsed)
                     at, size, self.cut = end, self._size_here(end), 0
                     continue
-            found = self._next(at + 1)
-            self.lost, self.cut = self.lost + found - at, self.cut + found - at
-            at, size = found, self._size_here(found)
+            begin = self._next(at + 1)
+            self.lost, self.cut = self.lost + begin - at, self.cut + begin - at
+            at, size = begin, self._size_here(begin)
 
     def _load(self, position: int, count: int) -> int:
         """Hold a number of bytes of the file from a position on, as far as there are; return the offset in the data."""

@@ -192,7 +192,7 @@ class Mission:
         return any(leg.faces or math.isfinite(leg.heading) for leg in self.legs)
 
     @property
-    def sees(self) -> bool:
+    def uses_features(self) -> bool:
         """True if features matter: the vehicle turns to them, or regions of visibility move."""
         return self.turns or bool(self.views)
 
@@ -237,12 +237,12 @@ def make_mission(goal: Shape, center: Vector3, motion: GoalMotion, regions: tupl
         seen = legs[-1].feature
         if len(legs) > _MAX_LEGS:
             raise ScenarioError(f"goal.then has more than {_MAX_LEGS} pieces, expected at most as many")
-    moved = tuple(i for i, shape in views.items() if any(leg.feature != shape.feature for leg in legs))
-    for i in moved:
+    moving_views = tuple(i for i, shape in views.items() if any(leg.feature != shape.feature for leg in legs))
+    for i in moving_views:
         if regions[i].moves:
             name = regions[i].region.name
             raise ScenarioError(f"regions.{name} moves, expected one at rest: the goal's features move it")
-    return Mission(tuple(legs), tuple(stops), tuple(keys), moved)
+    return Mission(tuple(legs), tuple(stops), tuple(keys), moving_views)
 
 
 def _legs_of(entry: GoalEntry, common: Leg) -> Iterator[tuple[str, str, Leg]]:
@@ -274,15 +274,15 @@ def _rings(entry: GoalEntry, leg: Leg, center: Array, radius: float) -> Iterator
         middle = center + along * axis
         ring = leg._replace(feature=entry.feature or _vector(middle))
 
-        def at(angle: float, middle: Array = middle) -> Vector3:
+        def point_at(angle: float, middle: Array = middle) -> Vector3:
             return _vector(middle + radius * (math.cos(angle) * u + math.sin(angle) * v))
 
-        start = ring._replace(center=at(angle))
+        start = ring._replace(center=point_at(angle))
         if n and math.dist(last.center, start.center) > _SHORTEST:
             yield "", "center", start._replace(pace=entry.pace)
         yield f"ring {n + 1}", "center", start
         for k in range(1, pieces + 1):
-            last = ring._replace(center=at(angle + 2.0 * math.pi * entry.turns * k / pieces), pace=entry.pace)
+            last = ring._replace(center=point_at(angle + 2.0 * math.pi * entry.turns * k / pieces), pace=entry.pace)
             yield "", "center", last
         angle += 2.0 * math.pi * entry.turns
     yield "rings done", "center", last._replace(pace=0.0)

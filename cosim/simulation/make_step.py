@@ -111,7 +111,7 @@ def make_mission_model(scenario: Scenario) -> MissionModel:
         np.array, zip(*mission.legs, strict=True)
     )
     centers[0] = 0.0  # that of the goal itself
-    if not mission.sees:
+    if not mission.uses_features:
         features = np.full_like(features, np.nan)
     kept = np.where(np.isnan(headings), 0.0, headings - bow)
     views = [scenario.regions[i].region.shape for i in mission.views]

@@ -56,7 +56,9 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | 
     shapes += [(f"regions.{i}.shape", r.region.shape, data.regions, i) for i, r in enumerate(scenario.regions)]
     for path, shape, packed, i in shapes:
         positions, first = list(_positions(path, shape)), memory.keep(packed.numbers) + int(packed.offsets[i])
-        if scenario.mission.sees and isinstance(shape, Visibility):  # the mission looks at its feature, or moves it
+        if scenario.mission.uses_features and isinstance(
+            shape, Visibility
+        ):  # the mission looks at its feature, or moves it
             positions = []
         # of a goal without a point for its center, the page does not know the shifts to its next positions
         if not positions or (path == "goal" and scenario.goal_then and not has_center):
@@ -81,11 +83,11 @@ def _places(flight: Flight, memory: Memory) -> dict[str, tuple[str, tuple[int, .
     scenario, model, targets = flight.scenario, flight.model.mission, {}
     for key in dict.fromkeys(scenario.mission.keys[1:]):
         north = f"{key}.0"
-        moved = scenario.replace({north: float(value_at(scenario.table, north, scenario.vehicle)) + 1.0}).mission
+        shifted = scenario.replace({north: float(value_at(scenario.table, north, scenario.vehicle)) + 1.0}).mission
         for axis in range(3):
             offsets, numbers = [], []
             for array, field in ((model.centers, "center"), (model.features, "feature")):
-                for i, (leg, other) in enumerate(zip(scenario.mission.legs, moved.legs, strict=True)):
+                for i, (leg, other) in enumerate(zip(scenario.mission.legs, shifted.legs, strict=True)):
                     if getattr(other, field)[0] - getattr(leg, field)[0] > 0.5:
                         offsets.append(memory.keep(array) + 3 * i + axis)
                         numbers.append(float(array[i, axis]))

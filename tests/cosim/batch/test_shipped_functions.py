@@ -96,6 +96,7 @@ def test_each_function_is_written_to_its_own_c_file(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)  # hundreds of compilations
 @pytest.mark.parametrize("platforms", ["native", "all"])
 def test_libraries_are_written_for_each_platform(tmp_path, platforms):
     if platforms == "all":

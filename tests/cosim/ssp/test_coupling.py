@@ -40,7 +40,7 @@ def hanging(tmp_path_factory):
     return load
 
 
-def moved(scenario):
+def motion_of(scenario):
     """Return the motion after each step in our master, without a force of the law."""
     with Master(scenario, FunctionLaw(lambda *_: np.zeros(6))) as master:
         kept = Keep(master)
@@ -90,7 +90,7 @@ def test_our_master_equals_independent_ones(master, hanging, tmp_path):
     """The plant sinks for 20 s: the tether gets taut, and the current turns and grows."""
     scenario = hanging(1000)
     system = write_coupled_system(scenario, tmp_path / "hanging.ssp")
-    expected, got = in_master(master, system, 1000, STEP, tmp_path / "rows.npy"), moved(scenario)
+    expected, got = in_master(master, system, 1000, STEP, tmp_path / "rows.npy"), motion_of(scenario)
     assert any(tether(motion).any() for motion in expected)
     np.testing.assert_allclose(got, expected, rtol=0.0, atol=1e-9)
 
@@ -102,7 +102,7 @@ def test_coupling_error_converges_linearly_with_the_step(hanging):
     errors = []
     for step in (STEP, 0.5 * STEP):
         steps = round(20.0 / step)
-        got = moved(hanging(steps, step))[-1]
+        got = motion_of(hanging(steps, step))[-1]
         errors.append(np.abs(got - exact).max())
     assert errors[1] < 0.015
     assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.2)
@@ -111,7 +111,7 @@ def test_coupling_error_converges_linearly_with_the_step(hanging):
 @pytest.mark.slow
 def test_static_tether_stretch_matches_net_weight_and_drag(hanging):
     """By hand, with the drag of each body axis; and the moments of tether and weight cancel."""
-    end = moved(hanging(12500))[-1]
+    end = motion_of(hanging(12500))[-1]
     assert np.abs(end[7:]).max() < 1e-3
     R = rotation(end[3:7])
     water, _, _ = current(250.0, end[2])
