@@ -101,7 +101,7 @@ def require(ok: bool, key: str, received: object, expected: str) -> None:
 def hint(received: str, known: typing.Iterable[str]) -> str:
     """Format a hint for an unknown name: the nearest known one, else a list of all."""
     known, received = sorted(known), received[:_MAX_COMPARED]  # a comparison takes time with the square of the length
-    matches = difflib.get_close_matches(received, known, n=1, cutoff=0.5)
+    matches = difflib.get_close_matches(received[:100], known, n=1, cutoff=0.5)
     if matches:
         return f"did you mean {matches[0]!r}?"
     listed = ", ".join(known) if len(known) <= _MAX_LISTED else f"{len(known)} names, such as {', '.join(known[:3])}"

@@ -85,6 +85,6 @@ def _match_names(pattern: str, names: Sequence[str]) -> list[str]:
     # exact names first: in a pattern, the brackets of thrust[1] would be a character class
     matching = [name for name in names if name == pattern] or [name for name in names if fnmatchcase(name, pattern)]
     if not matching:
-        near = difflib.get_close_matches(pattern, names, n=3, cutoff=0.0)
+        near = difflib.get_close_matches(pattern[:100], names, n=3, cutoff=0.0)
         raise ExportError(f"--signals {pattern}: fits no signal of the run; expected such as {', '.join(near)}")
     return matching

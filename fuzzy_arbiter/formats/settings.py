@@ -50,7 +50,7 @@ def read_settings(comments: Iterable[tuple[int, str]], keys: Sequence[str] = tup
     for line, text in comments:
         if not text.strip().startswith(MARK):
             word = re.match(r"\s*([\w-]*)", text)
-            if word and difflib.SequenceMatcher(None, word[1].lower(), MARK[:-1]).ratio() > 0.8:
+            if word and difflib.SequenceMatcher(None, word[1][:100].lower(), MARK[:-1]).ratio() > 0.8:
                 refuse(line, f"{text.strip()!r} is almost such a comment, expected {MARK!r} or another first word")
             continue
         if first:

@@ -133,7 +133,7 @@ class CoSimulationInstance:
     def _variable(self, name: str) -> ModelVariable:
         known = self._instance.variables
         if name not in known:
-            matches = difflib.get_close_matches(str(name), known, n=1)
+            matches = difflib.get_close_matches(str(name)[:100], known, n=1)
             suggestion = (
                 f"did you mean {matches[0]!r}?" if matches else f"expected one of the {len(known)} in plant.names"
             )
