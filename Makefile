@@ -29,7 +29,7 @@ HERE := --editable ./fuzzy_arbiter --editable
 # tests start hundreds of processes: where bytecode is not kept, each compiles what it imports again
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: run test lint coverage mutation mutation-sample docs laws bench dist packaging tour lowest portable clean
+.PHONY: run test lint coverage coverage-fuzzy coverage-plant coverage-mathematics coverage-mavlink mutation mutation-sample docs laws bench dist packaging tour lowest portable clean
 
 run: $(VENV)/installed
 	$(BIN)/cosim run paper
@@ -43,7 +43,7 @@ lint: $(VENV)/extras
 	$(BIN)/mypy
 
 # what is run as C, or in other processes and browsers, goes unseen: only where the number means something
-cover = COVERAGE_FILE=build/coverage $(BIN)/python -m coverage run --include='$(2)' --omit=plant_fmu/checking/drivers.py \
+cover = mkdir -p build && COVERAGE_FILE=build/coverage $(BIN)/python -m coverage run --include='$(2)' --omit=plant_fmu/checking/drivers.py \
 	-m pytest -q --medium $(3) && COVERAGE_FILE=build/coverage $(BIN)/python -m coverage report --fail-under=$(1)
 csv = $(subst $(subst ,, ),$(comma),$(1))
 MATHEMATICS := $(call csv,$(patsubst %,controller/%.py,allocation quadratic_program paper_law quaternion restoring \
@@ -53,11 +53,19 @@ MATHEMATICS_TESTS := $(patsubst %,tests/controller/test_%.py,quadratic_program a
 MAVLINK := $(call csv,$(addprefix cosim/mavlink/,wire/encode.py wire/framing.py wire/signing.py vehicle/row_layout.py \
 	messages/* services/*))
 
-coverage: $(VENV)/extras
-	mkdir -p build
+coverage: coverage-fuzzy coverage-plant coverage-mathematics coverage-mavlink
+
+coverage-fuzzy: $(VENV)/extras
 	$(call cover,98,fuzzy_arbiter/*,tests/fuzzy_arbiter)
+
+coverage-plant: $(VENV)/extras
 	$(call cover,88,plant_fmu/*,tests/plant_fmu tests/security/test_fmu_files.py)
-	SUBREACH_INTERPRETED=1 $(call cover,97,$(MATHEMATICS),$(MATHEMATICS_TESTS) -W ignore::RuntimeWarning)
+
+coverage-mathematics: export SUBREACH_INTERPRETED = 1
+coverage-mathematics: $(VENV)/extras
+	$(call cover,97,$(MATHEMATICS),$(MATHEMATICS_TESTS) -W ignore::RuntimeWarning)
+
+coverage-mavlink: $(VENV)/extras
 	$(call cover,96,$(MAVLINK),tests/cosim/mavlink/test_*.py)
 
 mutation: $(VENV)/extras

@@ -26,27 +26,29 @@ DATA = Path(__file__).parent / "data"
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--medium", action="store_true", help="also run the tests marked medium")
     parser.addoption("--slow", action="store_true", help="also run the tests marked medium or slow")
-    parser.addoption("--share", default="1/1", metavar="K/N", help="of the medium and slow ones the K-th of N shares")
+    parser.addoption("--share", metavar="K/N", help="only tests that --slow adds, of these the K-th of N shares")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell lets what it starts with & ignore Ctrl-C
-    settings.load_profile("full" if config.getoption("--slow") else "fast")
+    full = config.getoption("--slow") or config.getoption("--share")
+    settings.load_profile("full" if full else "fast")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    share, shares = map(int, config.getoption("--share").split("/"))
-    slow = config.getoption("--slow")
+    one_share = config.getoption("--share")
+    share, shares = map(int, (one_share or "1/1").split("/"))
+    slow = config.getoption("--slow") or one_share
     fast: Counter[str] = Counter()  # cases that run always, by function
 
     def runs(item: pytest.Item) -> bool:
         medium, function = item.get_closest_marker("medium"), item.nodeid.partition("[")[0]
         if item.get_closest_marker("slow") is None:
             if medium is None:
-                return True
+                return not one_share
             if fast[function] < medium.kwargs.get("fast", 0):
                 fast[function] += 1
-                return True
+                return not one_share
             if not slow and not config.getoption("--medium"):
                 return False
         elif not slow:

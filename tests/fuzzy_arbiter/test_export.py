@@ -339,7 +339,7 @@ DIPS = [
 ]  # fmt: skip
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.parametrize("implication", ["min", "prod"])
 def test_positions_of_all_maxima_count(implication, tmp_path):
     """Also those between which the height dips within a panel, at positions that a grid finds."""

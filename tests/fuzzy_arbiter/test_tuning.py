@@ -77,7 +77,7 @@ def test_values_are_found_as_linear_least_squares_finds_them():
     assert list(result.parameters) == ["sail.full.value", "sail.reefed.wind", "sail.reefed.constant"]
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.parametrize("seed", [2, 0, 1, 3])
 def test_order_and_ranges_are_kept_whatever_the_data(seed):
     rng = np.random.default_rng(seed)
@@ -140,6 +140,7 @@ def test_invalid_data_is_refused_in_one_line(arguments, fault):
         fit(tipping(), x, y, **options)
 
 
+@pytest.mark.medium
 def test_undefined_outputs_and_missing_scipy_are_named():
     system = tipping()
     undefined = replace(system, outputs=(replace(system.outputs[0], default=None),), rules=system.rules[1:2])

@@ -377,6 +377,7 @@ def test_undecided_check_is_not_ok(name):
     assert not replace(v, checks=checks).ok
 
 
+@pytest.mark.medium
 def test_a_variable_of_very_many_terms_is_not_verified():
     terms = {f"t{j}": triangle(j - 1.0, float(j), j + 1.0) for j in range(1000)}
     x, y = Variable("x", (0.0, 999.0), terms), Output("y", (0.0, 999.0), terms)

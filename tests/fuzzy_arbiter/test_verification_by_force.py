@@ -117,6 +117,7 @@ def test_stretches_against_samples(drawn):
             assert stretch.least - 1e-12 <= total <= stretch.greatest + 1e-12
 
 
+@pytest.mark.medium(fast=12)
 @pytest.mark.parametrize("conjunction", T_NORMS)
 @pytest.mark.parametrize("disjunction", S_NORMS)
 def test_completeness_of_any_norms_and_curves_against_samples(conjunction, disjunction):

@@ -29,6 +29,7 @@ def test_lagged_thrust_motion_matches_the_analytic_integral(make_slave):
     assert slave.get("position.x")[0] == pytest.approx(f / m * (t**2 / 2 - T * t - T**2 * np.expm1(-t / T)), rel=1e-10)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(("T", "sign"), [(0.3, 1.0), (0.0, -1.0)])
 def test_a_rate_limit_ramps_then_settles(make_slave, fmi, T, sign):
     """f' = (25 - f) / lag, at most 20: a ramp, then an exponential; the shortest lag is 1 ms."""

@@ -80,7 +80,7 @@ def test_valid_start_logs_nothing(make_slave, fmi):
     assert [text for status, text in said if status > 0] == []
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.parametrize(
     "change",  # the second is finite and within range, yet wrong: the damping outruns the step
     [{"wrench.X": 9e8}, {"wrench.K": 1e5}, {"wrench.K": 2.99e6}, {"wrench.K": 1e9},

@@ -87,6 +87,7 @@ def test_d6_each_missing_column_is_named(kind, monkeypatch, caplog):
     require_columns(scenario, Table([*names, "of another"]))
 
 
+@pytest.mark.medium(fast=1)
 def test_d6_the_names_are_those_of_the_run(kind):
     scenario, names = kind
     with Master(scenario) as master:

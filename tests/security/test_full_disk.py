@@ -65,6 +65,7 @@ def test_d9_command_succeeds_after_disk_space_is_freed(tmp_path, monkeypatch, of
     assert run_scenario(own, out, report=False).summary["status"] == "completed"
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("steps", [1, 3])
 def test_d9_autopilot_run_on_a_full_disk_leaves_no_folder(tmp_path, monkeypatch, steps):
     own = scenario_to_fly("sitl", [], None, 400, "ardupilot")

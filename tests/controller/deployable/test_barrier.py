@@ -213,6 +213,7 @@ def test_bound_rises_with_the_clearance_and_falls_only_by_restarts_and_jumps():
     assert bound(-0.02) == -0.02
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("period", [0.01, 0.05])
 def test_error_of_the_acceleration_is_found_in_the_corrections_of_any_estimate(period):
     """Lemma 1 of docs/theory.md: what errors add to psi, and what corrections add, differ by twice the velocity's."""
@@ -236,6 +237,7 @@ def test_error_of_the_acceleration_is_found_in_the_corrections_of_any_estimate(p
     assert worst > 0.1
 
 
+@pytest.mark.medium
 def test_theorem_holds_for_the_errors_that_it_admits():
     """docs/theory.md: a point that brakes before a wall by its row alone, with random errors and with lasting ones."""
     rng, period, kappa, rate, nearest = np.random.default_rng(9), 0.002, GAINS.barrier_slope, GAINS.barrier_rate, np.inf

@@ -121,6 +121,7 @@ def test_partly_covered_goal_is_entered_at_its_free_part():
     assert least_clearance(plan.path, plan.points, regions) > GAINS.margin
 
 
+@pytest.mark.medium
 def test_path_end_follows_a_moving_goal():
     """Given a velocity, and streamed to places that none tells of."""
     sailing = Region("goal", GOAL.shape, "in", (0.1, -0.2, 0.0))

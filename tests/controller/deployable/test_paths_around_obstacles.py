@@ -604,6 +604,7 @@ def test_distant_regions_are_not_reevaluated(monkeypatch):
         assert least <= len(evaluated) <= most
 
 
+@pytest.mark.medium
 def test_trees_grow_faster_once_the_path_has_been_blocked_for_a_second():
     """A goal that walls enclose: no path is found, so that every node stays."""
     sides = [((1.0, 0.0, 0.0), (0.4, 3.0, 3.0)), ((0.0, 1.0, 0.0), (3.0, 0.4, 3.0)), ((0.0, 0.0, 1.0), (3.0, 3.0, 0.4))]

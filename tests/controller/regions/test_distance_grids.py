@@ -50,6 +50,7 @@ SOLIDS = {
 }
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("offset", [0.0, 0.3])
 @pytest.mark.parametrize("name", SOLIDS)
 def test_clearance_is_never_above_the_true_one_nor_much_below(name, offset, tmp_path):

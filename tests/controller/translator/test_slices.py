@@ -78,7 +78,7 @@ def chosen_function(seed, folder):
     return names["chosen"]
 
 
-@pytest.mark.medium(fast=2)
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("seed", range(6))
 def test_random_slices_are_those_of_numpy(seed, tmp_path):
     function, other = chosen_function(seed, tmp_path), sliced(0)

@@ -244,7 +244,7 @@ def comparison_to_attack(out, flown, fakes, idle):
     return out / "compare.json", write_comparison_page
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.parametrize("make", [sweep_to_attack, campaign_to_attack, comparison_to_attack])
 def test_hostile_texts_are_escaped(make, flown, tmp_path, fakes, idle):
     """A page whose numbers hold attacks has the elements that it has without them."""

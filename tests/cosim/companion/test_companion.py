@@ -193,6 +193,7 @@ NOT_STEERED = {
 }  # fmt: skip
 
 
+@pytest.mark.medium(fast=4)
 @pytest.mark.parametrize(("kind", "options", "event", "words"), NOT_STEERED.values(), ids=NOT_STEERED)
 def test_no_setpoints_are_sent_to_a_vehicle_that_cannot_be_steered(tmp_path, kind, options, event, words):
     link = StandIn(**{"profile": "generic", "shift": SHIFT} | kind)
@@ -259,6 +260,7 @@ def test_an_ardusub_that_was_armed_here_dives_level_before_it_is_steered(tmp_pat
     assert link.column("sea bed.clearance").min() > 0.3
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("ends", [pytest.param(False, marks=pytest.mark.medium), True])
 def test_dry_run_sends_no_setpoints_and_only_message_requests(tmp_path, link, ends):
     """Nor when something ends it."""
@@ -432,6 +434,7 @@ def test_frame_drift_widens_margins(tmp_path, margins, link):
     assert margins[-1] == pytest.approx(UNSEEN + 0.3, abs=0.1)
 
 
+@pytest.mark.medium
 def test_dead_reckoning_widens_margins_with_distance(tmp_path, margins, link):
     link.tamper["EKF_STATUS_REPORT"] = link.tamper["ESTIMATOR_STATUS"] = lambda m: setattr(m, "flags", 8)
     flight = Flight(tmp_path, 6.0, link=link, reckoning_error=0.05)
@@ -599,6 +602,7 @@ def test_documented_tables_match_the_code():
 # ---- the run that is left ----
 
 
+@pytest.mark.medium
 def test_record_holds_the_exchange_with_the_autopilot(tmp_path):
     flight = Flight(tmp_path, 3.0)
     run = load_run(tmp_path / "run")

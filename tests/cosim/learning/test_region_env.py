@@ -47,7 +47,7 @@ def episode(env, seed, actions):
     return [first, *(part for action in actions for part in env.step(action)[:2])]
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.filterwarnings("ignore:.*Box observation space m..imum value")
 @pytest.mark.parametrize(
     "parameters",

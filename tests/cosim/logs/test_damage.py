@@ -97,6 +97,7 @@ def test_what_is_sound_is_read_before_and_after_damage(sound, suffix, kind, seed
     assert np.mean(np.abs(angles - expected)[known].max(axis=1) > 0.02) < 0.01 and known.mean() > 0.9 - cost
 
 
+@pytest.mark.medium
 def test_damage_in_real_logs_costs_what_it_covers(tmp_path, imported, six_thrusters):
     for name, vehicle in (("small.tlog", "bluerov2_heavy"), ("small.BIN", six_thrusters)):
         content = (LOGS / name).read_bytes()

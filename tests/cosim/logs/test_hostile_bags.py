@@ -26,7 +26,7 @@ def faults(folder, first, last):
     return {outcome["seed"]: outcome["fault"] for outcome in outcomes if outcome["fault"]}
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.parametrize("first", [0, 6, 12, 18])
 def test_a_few_hostile_bags_are_a_run_or_one_line(first, tmp_path):
     assert not faults(tmp_path, first, first + 6)

@@ -84,7 +84,7 @@ def test_streamed_excerpt_is_identical(every, rate, docking, streamed):
     assert long.take(steps, ["time"])["time"].tolist() == rows[0][steps, 0].tolist()
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.parametrize("name", RUNS)
 def test_figures_of_a_long_run_are_thinned_and_keep_extremes(name, run_of, streamed, monkeypatch):
     monkeypatch.setattr("cosim.report.figures.sampled_rows._MAX_SAMPLED_ROWS", 2000)

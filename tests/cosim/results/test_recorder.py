@@ -57,6 +57,7 @@ def test_a_killed_run_leaves_the_rows_that_were_flushed(tmp_path):
         assert pa.ipc.open_stream(file).read_all()["x"].to_pylist() == [2.0 * k for k in range(30)]
 
 
+@pytest.mark.medium
 def test_a_stream_that_is_cut_anywhere_is_read_up_to_its_last_complete_batch(tmp_path):
     record(Recorder(tmp_path, COLUMNS, batch_rows=10), 35)
     whole, counts = (tmp_path / STREAM).read_bytes(), []

@@ -77,7 +77,7 @@ def link(folder, profile, commands=False):
     return Mavlink(endpoints, MavlinkOptions(profile=profile, commands=commands))
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.parametrize("kind", KINDS)
 def test_custom_law_flies_on_links_and_in_the_live_view_with_the_same_bits(kind, tmp_path):
     run_scenario(SCENARIO, tmp_path / "plain", report=False, law=KINDS[kind]())

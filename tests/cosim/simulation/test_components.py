@@ -137,6 +137,7 @@ def in_fmpy(scenario, fmus, wrenches, order, folder):
     return np.array(rows)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
 def test_master_equals_an_independent_one(fmus, fmi, order, tmp_path):
     scenario = beside(fmus, fmi, "tether", "current", changes=[f"master.order={order}"])
@@ -179,6 +180,7 @@ def test_components_are_connected_with_each_other(fmus, by):
         np.testing.assert_array_equal(run["second.y"][2:], 2.0 * run["position.z"][2 - delay : -delay])
 
 
+@pytest.mark.medium
 def test_flights_without_a_record_are_the_runs(fmus, fmi):
     scenario = beside(fmus, fmi, "tether", "current")
     varied = Variation(scenario, ["components.tether.parameters.gain", "initial.position.1"])
@@ -192,6 +194,7 @@ def test_flights_without_a_record_are_the_runs(fmus, fmi):
         np.testing.assert_array_equal([outcome[f"final_{axis}"] for axis in "xyz"], [run[n][-1] for n in POSITION])
 
 
+@pytest.mark.medium
 def test_run_folder_repeats_the_run(fmus, fmi, tmp_path):
     """With two FMUs whose files have one name."""
     (tmp_path / "other").mkdir()

@@ -171,6 +171,7 @@ def test_frozen_sensor_counts_as_failed():
     assert flight.report("time_since_measurement").max() == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.medium
 def test_persistent_identical_measurements_are_eventually_accepted():
     """Such as one on a hook, while by the model the current carries it away."""
     spoil = frozen(10.0, np.inf, velocity_body=np.zeros(6))

@@ -51,6 +51,7 @@ def puck(fmus, fmi, changes=(), **plant):
     )
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("through", ["wrench", "thrusters"])
 def test_plant_of_the_vehicle_has_its_own_bits(fmi, through):
     """With equal names, and no maps."""
@@ -95,6 +96,7 @@ def test_angles_and_ned_velocity_become_quaternion_and_body_velocity(fmus, fmi):
     assert np.isnan(run["water_velocity.x"]).all() and "plant.position.x" in run.signals
 
 
+@pytest.mark.medium
 def test_run_with_report_replay_and_link(fmus, fmi, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run = run_scenario(puck(fmus, fmi), tmp_path / "run")

@@ -92,6 +92,7 @@ def test_controller_is_the_python_law_over_random_inputs(controller, scenario):
     assert abs(read(controller, "estimate.")).min() > 0.01
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("seed", [0, 7, 2**31 - 1, 2**31 + 7])
 def test_noise_of_the_controller_is_philox(seed, fmi):
     """White from tick to tick of the law, which comes at every third step."""
@@ -176,6 +177,7 @@ class PlainLaw(SlidingModeLaw):
         return PlainMemory(desired_quaternion, np.zeros(4), np.zeros(0), Field(n=n_regions))
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("law", [SlidingModeLaw, PlainLaw])
 def test_law_of_ones_own_needs_no_state_and_no_period_in_its_memory(law, fmi, monkeypatch):
     own = with_law(monkeypatch, law)
@@ -287,6 +289,7 @@ def test_arbiter_is_the_python_one_over_random_inputs(arbiter):
         np.testing.assert_allclose(arbiter.outputs.values, closed(memberships.tolist()), rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.medium
 def test_restored_controller_continues_identically(scenario, fmi):
     """Memory and counts are part of the FMU's state, and pass through bytes."""
     from plant_fmu import Plant

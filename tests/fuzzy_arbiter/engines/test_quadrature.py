@@ -76,7 +76,7 @@ def test_a_lone_gaussian_has_its_mean_for_all_values(deviation, implication):
             assert value(output, [cut], implication) == pytest.approx(9.7, abs=1e-9), (defuzzifier, cut)
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.parametrize("seed", range(8))
 def test_clipped_curves_match_quadrature_for_cuts_of_any_size(seed):
     rng, compared = np.random.default_rng(seed), 0
