@@ -32,7 +32,6 @@ try:
     from plant_fmu.errors import PlantFmuError, one_line
     from plant_fmu.pictures import IMAGES, PICTURES, image
     from plant_fmu.vehicle import load_vehicle, shipped_vehicles
-    from plant_fmu.vehicle_component import make_vehicle_component
 except ModuleNotFoundError as error:  # in a checkout that is not installed
     print(_missing(error), file=sys.stderr)
     sys.exit(2)
@@ -82,6 +81,8 @@ def _parser() -> argparse.ArgumentParser:
         f"beside these {WASM}, a WebAssembly component",
     )
     build.add_argument("--coupled", action="store_true", help="with inputs for currents, external forces and the like")
+    build.add_argument("--arrays", action="store_true", help="with arrays, sensors on clocks, and event mode (FMI 3.0)")
+    build.add_argument("--small", action="store_true", help="with body and thrusters alone, for co-simulation")
     build.add_argument("--out", type=Path, help="file to write (default: NAME.fmu here)")
 
     check = verbs.add_parser("check", help="validate an FMU, and simulate it in FMPy and in Plant")
@@ -197,8 +198,9 @@ def _run(options: argparse.Namespace) -> int:
         for name, text in reference_files(vehicle, reference(vehicle)).items():
             print(_write(options.out / name, text))
     else:
-        component = make_vehicle_component(vehicle, coupled=options.coupled)
-        print(build_fmu(component, options.fmi, options.out or Path(f"{vehicle.name}.fmu"), options.platforms))
+        out, kind = options.out or Path(f"{vehicle.name}.fmu"), ("coupled", "arrays", "small")
+        choices = {name: getattr(options, name) for name in kind}
+        print(build_fmu(vehicle, options.fmi, out, options.platforms, **choices))
     return 0
 
 

@@ -40,7 +40,16 @@ def require_version(fmi: int) -> None:
         raise BuildError(f"FMI version is {fmi!r}, expected 2 or 3")
 
 
-def build_fmu(what: Vehicle | Component, fmi: int, out: str | Path, platforms: str = NATIVE) -> Path:
+def build_fmu(
+    what: Vehicle | Component,
+    fmi: int,
+    out: str | Path,
+    platforms: str = NATIVE,
+    *,
+    coupled: bool = False,
+    arrays: bool = False,
+    small: bool = False,
+) -> Path:
     """Write the FMU of a vehicle, or of another component.
 
     Parameters
@@ -56,6 +65,12 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: str | Path, platforms: s
         ``x86_64-linux,x86_64-windows``. Libraries that come with the package are taken where they fit. Else they are
         compiled, for this machine by whatever compiler is here, for others by that of the ziglang package. ``wasm``,
         alone or after a comma, adds a WebAssembly component to an FMU of FMI 3.0.
+    coupled : bool
+        True for a vehicle with inputs for currents, external forces and the like.
+    arrays : bool
+        True for a vehicle with arrays, such as ``thrust`` of 8, sensors on clocks, and event mode. FMI 3.0 alone.
+    small : bool
+        True for a vehicle that shows body and thrusters alone, 60 variables of 330, for co-simulation.
 
     Returns
     -------
@@ -65,7 +80,7 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: str | Path, platforms: s
     Raises
     ------
     BuildError
-        If a platform is not known, there is no compiler, it fails, or `out` cannot be written.
+        If a platform is not known, there is no compiler, it fails, or `out` cannot be written; or arrays in FMI 2.0.
 
     Examples
     --------
@@ -76,7 +91,14 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: str | Path, platforms: s
     """
     require_version(fmi)
     out = Path(out)
-    component = _component(what)
+    if isinstance(what, Vehicle):
+        component = make_vehicle_component(what, coupled=coupled, arrays=arrays, small=small)
+    elif coupled or arrays or small:
+        raise BuildError("coupled, arrays and small are for a vehicle, expected none of them with a component")
+    else:
+        component = what
+    if fmi == 2 and any(v.array for v in component.variables):
+        raise BuildError("FMI version is 2, expected 3 with arrays and clocks, which FMI 2.0 lacks")
     libraries_for, wasm = without_wasm(platforms)
     if wasm and fmi == 2:
         raise BuildError(

@@ -32,3 +32,13 @@ class Component:
     def has_states(self) -> bool:
         """True if it has continuous states."""
         return any(v.role == "state" for v in self.variables)
+
+    @property
+    def has_clocks(self) -> bool:
+        """True if it has clocks, and so event mode in co-simulation; for FMI 3.0 alone, as arrays are."""
+        return any(v.type == "clock" for v in self.variables)
+
+    @property
+    def has_model_exchange(self) -> bool:
+        """True if it shows the derivatives of its states."""
+        return any(v.role == "derivative" and not v.hidden for v in self.variables)

@@ -42,6 +42,15 @@ UNITS: dict[str, dict[str, int]] = {
     "s2/kg": {"kg": -1, "s": 2},
 }
 
+# quantity of each unit, as Modelica's standard library names it where it has it
+QUANTITIES = {
+    "s": "Time", "Hz": "Frequency", "m": "Length", "m/s": "Velocity", "m/s2": "Acceleration", "rad": "Angle",
+    "rad/s": "AngularVelocity", "rad/s2": "AngularAcceleration", "kg": "Mass", "kg.m": "MassMoment",
+    "kg.m2": "MomentOfInertia", "N": "Force", "N/s": "ForceRate", "N.m": "Torque", "N.m/s": "TorqueRate",
+    "V": "ElectricPotential", "N.s/m": "LinearDamping", "N.m.s/rad": "AngularDamping",
+    "N.s2/m2": "QuadraticDamping", "N.m.s2/rad2": "QuadraticAngularDamping",
+}  # fmt: skip
+
 # number of coherent SI units in one of the unit, where it is not 1
 _FACTORS = {"us": 1e-6, "rev/min": 2.0 * math.pi / 60.0}
 

@@ -11,7 +11,7 @@ from plant_fmu.component import STEP, STOP_TIME, Component
 from plant_fmu.contents import contents
 from plant_fmu.errors import BuildError
 from plant_fmu.toml_tables import hint
-from plant_fmu.variables import Variable, variables
+from plant_fmu.variables import Variable, described, show_small, variables, with_arrays
 from plant_fmu.vehicle import Vehicle
 
 
@@ -21,17 +21,24 @@ def make_vehicle_component(
     stop_time: float = STOP_TIME,
     step: float = STEP,
     coupled: bool = False,
+    arrays: bool = False,
+    small: bool = False,
 ) -> Component:
-    """Return the plant of a vehicle; stop_time, step [s]."""
+    """Return the plant of a vehicle; stop_time, step [s]; for FMI 3.0 alone with arrays and sensors on clocks."""
     rows = tuple(variables(vehicle, coupled))
+    if small:
+        rows = show_small(rows)
+    if arrays:
+        rows = with_arrays(rows, has_clocks=not small)
     if start is not None:
         rows = _started(rows, start)
+    own = [v for _, v in described(rows)] if start is not None or coupled or arrays or small else None
     return Component(
         name=vehicle.name.replace("-", "_"),  # as FMI's model identifier begins names in C
         description=f"Underwater vehicle, six degrees of freedom: {vehicle.title}",
         variables=rows,
         sources=plant_sources(),
-        contents=lambda fmi: contents(vehicle, fmi, rows if start is not None or coupled else None),
+        contents=lambda fmi: contents(vehicle, fmi, own),
         header="vehicle.h",
         constants={"N_THRUSTERS": vehicle.n_thrusters, "COUPLED": int(coupled)},
         stop_time=stop_time,

@@ -60,7 +60,11 @@ def header(component: Component, token: str) -> str:
     shared = _external_names(data for file, data in files.items() if file.endswith(".h"))
     roles = ("state", "derivative", "input")
     first = {f"FIRST_{role.upper()}": next((i for i, v in enumerate(rows) if v.role == role), 0) for role in roles}
-    constants = {**component.constants, **first}
+    clocks = [i for i, v in enumerate(rows) if v.type == "clock"]
+    constants = {
+        **component.constants, **first, "FIRST_CLOCK": min(clocks, default=0), "N_CLOCK_VARIABLES": len(clocks),
+        "N_ARRAYS": sum(v.size > 1 for v in rows),
+    }  # fmt: skip
     lines = [
         f"/* {name}: generated from the table of variables. */",
         f"#ifndef {guard}",
@@ -82,7 +86,7 @@ def header(component: Component, token: str) -> str:
         role = "OUTPUT" if v.role == "derivative" else v.role.upper()
         numbers = (v.start, v.quantity.minimum, v.quantity.maximum, v.nominal)
         values = ", ".join(repr(float(x)) for x in numbers)
-        lines.append(f'    {{"{v.name}", TYPE_{v.type.upper()}, {role}, AT({v.member}), {values}}}, \\')
+        lines.append(f'    {{"{v.name}", TYPE_{v.type.upper()}, {role}, {v.size}, AT({v.member}), {values}}}, \\')
     lines[-1] = lines[-1].removesuffix(" \\")
     return "\n".join([*lines, "", "#endif", ""])
 

@@ -43,7 +43,7 @@ def text(name: str) -> str:
 
 @cache
 def _environment() -> Environment:
-    return make_environment(start=lambda v: _value(v, v.start), range=_range, number=_number)
+    return make_environment(start=_starts, range=_range, number=_number)
 
 
 def _roles(rows: Sequence[Variable]) -> Iterator[dict[str, object]]:
@@ -53,6 +53,12 @@ def _roles(rows: Sequence[Variable]) -> Iterator[dict[str, object]]:
         if members := [v for v in rows if v.role == name]:
             has_start = name in ("input", "state", "parameter")
             yield {"name": name, "title": title, "remark": remark, "variables": members, "has_start": has_start}
+
+
+def _starts(v: Variable) -> str:
+    """Return the start value, or those of an array; one where all are the same."""
+    values = v.starts if len({*v.starts}) > 1 else (v.start,)
+    return ", ".join(_value(v, value) for value in values)
 
 
 def _number(x: float) -> str:

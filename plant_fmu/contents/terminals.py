@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from xml.etree import ElementTree as ET
 
 from plant_fmu.markup import xml_text
-from plant_fmu.variables import Variable, variables
-from plant_fmu.vehicle import Vehicle
+from plant_fmu.variables import Variable
 
 _DESCRIPTIONS = {
     "pose": "Position and attitude of the vehicle",
@@ -44,10 +44,10 @@ class _Terminal:
         return self.nested.setdefault(path[0], _Terminal()).at(path[1:])
 
 
-def terminals_and_icons(vehicle: Vehicle) -> str:
+def terminals_and_icons(rows: Sequence[Variable]) -> str:
     """Return ``terminalsAndIcons.xml`` of FMI 3.0."""
     root = _Terminal()
-    for v in variables(vehicle):
+    for v in rows:
         location = _locate(v)
         if location:
             path, member = location
@@ -66,8 +66,12 @@ def terminals_and_icons(vehicle: Vehicle) -> str:
 def _locate(v: Variable) -> tuple[tuple[str, ...], str] | None:
     """Return the terminal of a variable and its name there."""
     # a signal must be an input or an output (FMI 3.0.2, predefined kinds of variables)
-    if v.local or v.role not in ("input", "state", "output"):
+    if v.local or v.role not in ("input", "state", "output") or v.type == "clock":
         return None
+    if v.name in _THRUSTER:  # an array
+        return ("thrusters",), _THRUSTER[v.name]
+    if v.name in _POSE:
+        return ("pose",), v.name
     indexed = re.fullmatch(r"(\w+)\[(\d+)\]", v.name)
     if indexed:
         name, number = indexed.groups()

@@ -106,7 +106,7 @@ static Status advance(Instance *instance, double end)
     double failed = 0.0;
     const Variable *invalid = NULL;
 
-    if (model_advance(m, end, &failed) && !(invalid = variables_first_invalid_state(m)))
+    if (model_advance(m, end, instance->returns_early, &failed) && !(invalid = variables_first_invalid_state(m)))
         return STATUS_OK;
 
     const double value = invalid ? *variable_real(m, invalid) : 0.0;
@@ -136,7 +136,7 @@ static bool valid_state(const Model *m)
         valid = valid && fabs(m->held.samples[i]) < 1e15;
     for (int i = 0; i < N_SENSORS; i++) {
         const double pending = m->held.pending[i];
-        valid = valid && m->held.delivered[i] >= 0.0 && m->held.delivered[i] < 1e15 && fabs(m->held.sample_time[i]) <= MAX_TIME &&
+        valid = valid && (m->held.ticked[i] | 1) == 1 && m->held.delivered[i] >= 0.0 && m->held.delivered[i] < 1e15 && fabs(m->held.sample_time[i]) <= MAX_TIME &&
                pending >= 0.0 && pending <= MAX_PENDING;
         for (int j = 0; valid && j < (int)pending; j++) {
             const Pending *sample = &m->held.queue[i][j];

@@ -117,6 +117,7 @@ static void deliver_sample(Held *held, int sensor)
             held->samples[i] = queue[0].values[next++];
     held->sample_time[sensor] = queue[0].taken;
     held->delivered[sensor] += 1.0;
+    held->ticked[sensor] = 1;
     held->pending[sensor] -= 1.0;
     memmove(queue, queue + 1, (MAX_PENDING - 1) * sizeof *queue);
 }
@@ -287,7 +288,16 @@ int model_apply_unlagged(Model *m)
 
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
 
-static int advance_core(Model *m, double end, double *failed)
+static int has_ticked(const Held *held)
+{
+    int any = 0;
+
+    for (int i = 0; i < N_SENSORS; i++)
+        any |= held->ticked[i];
+    return any;
+}
+
+static int advance_core(Model *m, double end, int stops, double *failed)
 {
     const double min_segment = 1e-9 * (end - m->time); /* no segment is shorter */
     int thrust_saturated[N_THRUSTERS], wrench_saturated;
@@ -295,7 +305,7 @@ static int advance_core(Model *m, double end, double *failed)
 
     tick_core(m);
     actuators_target(&m->plant.parameters, &m->inputs, &target, thrust_saturated, &wrench_saturated);
-    while (m->time < end) {
+    while (m->time < end && !(stops && has_ticked(&m->held))) {
         const double tick = m->held.next_tick, until = tick < end - min_segment ? tick : end;
 
         if (!plant_advance(&m->plant, &m->held.drift, m->time, until, m->plant.parameters.substep, &target, &m->state,
@@ -307,14 +317,14 @@ static int advance_core(Model *m, double end, double *failed)
     return 1;
 }
 
-int model_advance(Model *m, double end, double *failed)
+int model_advance(Model *m, double end, int stops, double *failed)
 {
     Model coupled;
 
     if (!COUPLED || !coupling_is_active(m))
-        return advance_core(m, end, failed);
+        return advance_core(m, end, stops, failed);
     coupling_apply(m, &coupled);
-    const int done = advance_core(&coupled, end, failed);
+    const int done = advance_core(&coupled, end, stops, failed);
     m->state = coupled.state;
     m->held = coupled.held;
     m->time = coupled.time;

@@ -29,6 +29,7 @@ typedef struct { /* values that change only at ticks */
     double samples[N_MEASURED];
     double sample_time[N_SENSORS];         /* s, of the last delivered sample */
     double delivered[N_SENSORS];           /* number of samples */
+    int ticked[N_SENSORS];                 /* 1: a sample was delivered since they were cleared */
     double pending[N_SENSORS];             /* number of samples in the queue, oldest first */
     Pending queue[N_SENSORS][MAX_PENDING];
     Drift drift;
@@ -97,9 +98,10 @@ int model_shows_sample(const Model *model, int channel);
 /* Sets the forces without a lag to their commands. Returns 1 if any changed. */
 int model_apply_unlagged(Model *model);
 
-/* Integrates to the time `end`, with whole substeps from tick to tick. Returns 0 if a substep is unstable, and writes its
+/* Integrates to the time `end`, with whole substeps from tick to tick; if `stops`, at most until a sample is delivered.
+ * Returns 0 if a substep is unstable, and writes its
  * length [s] to `failed`; the model is then left where it failed. */
-int model_advance(Model *model, double end, double *failed);
+int model_advance(Model *model, double end, int stops, double *failed);
 
 /* Writes the exact directional derivative of state and outputs to `tangent`, along the parameters, state, inputs and time in
  * `seed`. Random numbers stay as drawn. Samples follow the state while `starting`, and are held afterwards. */

@@ -142,7 +142,9 @@ def _measured(output: Callable[..., Variable]) -> Iterator[Variable]:
     def measured(name: str, unit: str, description: str, sensor: str, *depends: str) -> Variable:
         member = f"measured[{len(channels)}]"
         channels.append(name)
-        return output(f"measured.{name}", member, q.unbounded(unit), description, f"{sensor}.*", *_RANDOM, *depends)
+        depends = (f"{sensor}.*", *_RANDOM, *depends)
+        row = output(f"measured.{name}", member, q.unbounded(unit), description, *depends)
+        return replace(row, clock=f"{sensor}.clock")
 
     channels: list[str] = []
     yield measured("depth", "m", "Depth from the pressure sensor", "depth_sensor", "position.z")
@@ -161,7 +163,10 @@ def _measured(output: Callable[..., Variable]) -> Iterator[Variable]:
         yield measured(f"position.{AXES[i]}", "m", f"USBL's position, {where}", "usbl", f"position.{AXES[i]}")
     for i, (sensor, what) in enumerate(SENSORS):
         description = f"Time of the last sample of {what}; -1e12 before the first"
-        yield output(f"measured.time.{sensor}", f"stamp[{i}]", q.unbounded("s"), description, f"{sensor}.rate", "time")
+        stamp = output(
+            f"measured.time.{sensor}", f"stamp[{i}]", q.unbounded("s"), description, f"{sensor}.rate", "time"
+        )
+        yield replace(stamp, clock=f"{sensor}.clock")
 
 
 def _derivatives(vehicle: Vehicle) -> Iterator[Variable]:

@@ -53,7 +53,7 @@ KINDS = {(2, "cs"): FMU2Slave, (3, "cs"): FMU3Slave, (2, "me"): FMU2Model, (3, "
 class CoSimulationInstance:
     """An instance with variables by name; `said` collects what the FMU logs."""
 
-    def __init__(self, path, interface="cs", logging_on=False):
+    def __init__(self, path, interface="cs", logging_on=False, **events):
         self.folder, self.description = extracted(Path(path), Path(path).stat().st_mtime_ns)
         self.by_name = {v.name: v for v in self.description.modelVariables}
         self.fmi = int(self.description.fmiVersion[0])
@@ -75,6 +75,7 @@ class CoSimulationInstance:
             self.fmu.instantiate(
                 logMessage=lambda env, status, category, text: self.said.append((status, text.decode())),
                 loggingOn=logging_on,
+                **events,
             )
         self.time = 0.0
         # FMPy has FMI 3.0's names for those of FMI 2.0 too
@@ -87,15 +88,19 @@ class CoSimulationInstance:
     def set_values(self, values):
         by_type = {}
         for name, value in values.items():
-            by_type.setdefault(self.by_name[name].type, {})[self.by_name[name].valueReference] = value
+            by_type.setdefault(self.by_name[name].type, {})[self.by_name[name].valueReference] = np.ravel(
+                value
+            ).tolist()
         for kind, numbers in by_type.items():
-            getattr(self.fmu, f"set{kind}")(list(numbers), list(numbers.values()))
+            getattr(self.fmu, f"set{kind}")(list(numbers), [x for items in numbers.values() for x in items])
 
     def get(self, *names):
         variables = [self.by_name[name] for name in names]
         types = {v.type for v in variables}
         if len(types) == 1:
-            return getattr(self.fmu, f"get{types.pop()}")([v.valueReference for v in variables])
+            counts = [int(np.prod(v.shape)) for v in variables if v.shape]
+            n = (sum(counts) + len(variables) - len(counts),) if counts else ()
+            return getattr(self.fmu, f"get{types.pop()}")([v.valueReference for v in variables], *n)
         return [x for name in names for x in self.get(name)]
 
     def flag(self, name):
@@ -131,8 +136,9 @@ class CoSimulationInstance:
         return self
 
     def step(self, h):
-        self.fmu.doStep(self.time, h)
+        results = self.fmu.doStep(self.time, h)
         self.time += h
+        return results
 
     def serialize(self, state):
         return bytes(self.fmu.serializeFMUState(state))

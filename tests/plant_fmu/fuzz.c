@@ -18,7 +18,7 @@ typedef fmi3Instance Unit;
 typedef fmi3FMUState Kept;
 #endif
 
-enum { MOST = 12, KEPT = 4 };
+enum { MOST = 12, KEPT = 4, WIDEST = 24 /* elements of the greatest array */ };
 
 static uint64_t seed = 88172645463325252u;
 static long refused, accepted[32];
@@ -45,6 +45,16 @@ static double value_of(unsigned reference)
     if (draw(6) == 0)
         return v->min + uniform() * (v->max - v->min);
     return v->start + (uniform() - 0.5) * (draw(3) ? 0.1 : 3.0) * (v->nominal > 0.0 ? v->nominal : 1.0);
+}
+
+/* The number of values of some variables. */
+static size_t elements(const unsigned references[], size_t n)
+{
+    size_t sum = 0;
+
+    for (size_t i = 0; i < n; i++)
+        sum += references[i] < N_VARIABLES ? VARIABLES[references[i]].size : 1;
+    return sum;
 }
 
 /* Mostly as what the variable is. */
@@ -89,6 +99,7 @@ static Unit create(int me, int quiet)
 #define CALL(name) fmi2##name
 #define SET_REALS(c, vr, n, v) fmi2SetReal(c, vr, n, v)
 #define GET_REALS(c, vr, n, v) fmi2GetReal(c, vr, n, v)
+#define TO_STEP_MODE(c) fmi2Error
 #define SAVE(c, s) fmi2GetFMUstate(c, s)
 #define RESTORE(c, s) fmi2SetFMUstate(c, s)
 #define FREE(c, s) fmi2FreeFMUstate(c, s)
@@ -141,12 +152,14 @@ static Unit create(int me, int quiet)
 {
     const char *token = draw(50) ? INSTANTIATION_TOKEN : "no%s%n", *name = draw(20) ? "x" : NULL;
     return me ? fmi3InstantiateModelExchange(name, token, NULL, 0, draw(2), NULL, quiet ? NULL : log_callback)
-              : fmi3InstantiateCoSimulation(name, token, NULL, 0, draw(2), 0, 0, NULL, 0, NULL, quiet ? NULL : log_callback, NULL);
+              : fmi3InstantiateCoSimulation(name, token, NULL, 0, draw(2), N_CLOCK_VARIABLES > 0 && draw(2), draw(2), NULL, 0, NULL,
+                                            quiet ? NULL : log_callback, NULL);
 }
 
 #define CALL(name) fmi3##name
-#define SET_REALS(c, vr, n, v) fmi3SetFloat64(c, vr, n, v, draw(50) ? n : n + 1)
-#define GET_REALS(c, vr, n, v) fmi3GetFloat64(c, vr, n, v, n)
+#define SET_REALS(c, vr, n, v) fmi3SetFloat64(c, vr, n, v, elements(vr, n) + !draw(50))
+#define GET_REALS(c, vr, n, v) fmi3GetFloat64(c, vr, n, v, elements(vr, n))
+#define TO_STEP_MODE(c) fmi3EnterStepMode(c)
 #define SAVE(c, s) fmi3GetFMUState(c, s)
 #define RESTORE(c, s) fmi3SetFMUState(c, s)
 #define FREE(c, s) fmi3FreeFMUState(c, s)
@@ -154,8 +167,8 @@ static Unit create(int me, int quiet)
 #define PACK(c, s, b, n) fmi3SerializeFMUState(c, s, b, n)
 #define UNPACK(c, b, n, s) fmi3DeserializeFMUState(c, b, n, s)
 #define RATES(c, x, n) fmi3GetContinuousStateDerivatives(c, x, n)
-#define JACOBIAN(c, u, nu, k, nk, s, r) fmi3GetDirectionalDerivative(c, u, nu, k, nk, s, nk, r, nu)
-#define ADJOINT(c, u, nu, k, nk, s, r) fmi3GetAdjointDerivative(c, u, nu, k, nk, s, nu, r, nk)
+#define JACOBIAN(c, u, nu, k, nk, s, r) fmi3GetDirectionalDerivative(c, u, nu, k, nk, s, elements(k, nk), r, elements(u, nu))
+#define ADJOINT(c, u, nu, k, nk, s, r) fmi3GetAdjointDerivative(c, u, nu, k, nk, s, elements(u, nu), r, elements(k, nk))
 
 static int initialize(Unit c)
 {
@@ -166,6 +179,8 @@ static int update(Unit c)
 {
     fmi3Boolean b[5];
     double next;
+    const unsigned clock = FIRST_CLOCK + (unsigned)draw(N_CLOCK_VARIABLES + 1);
+    fmi3GetClock(c, &clock, 1, &b[0]);
     const int status = (int)fmi3UpdateDiscreteStates(c, &b[0], &b[1], &b[2], &b[3], &b[4], &next);
     check(status, &next, 1, "next event");
     return status;
@@ -180,11 +195,13 @@ static int step(Unit c, double t, double h)
 
 static int integers(Unit c, unsigned reference, int value)
 {
-    fmi3Int32 i = value;
-    fmi3Boolean b = value & 1;
-    fmi3GetInt32(c, &reference, 1, &i, 1);
-    fmi3GetBoolean(c, &reference, 1, &b, 1);
-    return (int)(as_integer(reference) ? fmi3SetInt32(c, &reference, 1, &value, 1) : fmi3SetBoolean(c, &reference, 1, &b, 1));
+    fmi3Int32 i[WIDEST] = {value};
+    fmi3Boolean b[WIDEST] = {value & 1};
+    const size_t n = elements(&reference, 1);
+    fmi3GetInt32(c, &reference, 1, i, n);
+    fmi3GetBoolean(c, &reference, 1, b, n);
+    i[0] = value, b[0] = value & 1;
+    return (int)(as_integer(reference) ? fmi3SetInt32(c, &reference, 1, i, n) : fmi3SetBoolean(c, &reference, 1, b, n));
 }
 
 #endif
@@ -214,7 +231,8 @@ static void serialize(Unit c, Kept from, Kept *to)
 static void call(Unit c, Kept kept[KEPT], double *t)
 {
     unsigned vr[MOST], other[MOST];
-    double v[MOST], w[MOST], x[N_STATES + 1];
+    double v[MOST * WIDEST + 1], w[MOST * WIDEST], x[N_STATES + 1];
+    size_t next = 0;
     const size_t n = draw(MOST), m = draw(MOST);
     const int which = (int)draw(24);
     int status = 0;
@@ -228,15 +246,17 @@ static void call(Unit c, Kept kept[KEPT], double *t)
             while (other[i] >= N_VARIABLES || VARIABLES[other[i]].role == OUTPUT || VARIABLES[other[i]].type != TYPE_REAL)
                 other[i] = (unsigned)draw(N_VARIABLES);
         }
-        v[i] = value_of(vr[i]);
-        w[i] = 2.0 * uniform() - 1.0;
+        for (size_t k = elements(&vr[i], 1); k > 0; k--)
+            v[next++] = value_of(vr[i]);
     }
+    for (size_t i = 0; i < MOST * WIDEST; i++)
+        w[i] = 2.0 * uniform() - 1.0;
     for (int i = 0; i < N_STATES + 1; i++)
         x[i] = value_of((unsigned)(FIRST_STATE + i));
 
     switch (which) {
     case 0: case 1: case 2: status = (int)SET_REALS(c, vr, n > 3 ? 1 : n, v); break;
-    case 3: case 4: status = (int)GET_REALS(c, vr, n, v); check(status, v, n, "get"); break;
+    case 3: case 4: status = (int)GET_REALS(c, vr, n, v); check(status, v, elements(vr, n), "get"); break;
     case 5: case 6: status = integers(c, draw(9) ? N_VARIABLES - 1 - (unsigned)draw(14) : vr[0], (int)draw(5) - 1); break;
     case 7: status = initialize(c); break;
     case 8: status = (int)CALL(ExitInitializationMode)(c); break;
@@ -251,7 +271,9 @@ static void call(Unit c, Kept kept[KEPT], double *t)
     case 15: status = (int)RESTORE(c, kept[draw(KEPT)]); break;
     case 16: status = (int)FREE(c, &kept[draw(KEPT)]); break;
     case 17: serialize(c, kept[draw(KEPT)], &kept[draw(KEPT)]); break;
-    case 18: status = (int)(draw(2) ? CALL(EnterEventMode)(c) : CALL(EnterContinuousTimeMode)(c)); break;
+    case 18:
+        status = (int)(draw(2) ? CALL(EnterEventMode)(c) : draw(2) ? CALL(EnterContinuousTimeMode)(c) : TO_STEP_MODE(c));
+        break;
     case 19: status = update(c); break;
     case 20: *t += draw(10) ? 0.01 : value_of(0); status = (int)CALL(SetTime)(c, *t); break;
     case 21:
@@ -263,8 +285,13 @@ static void call(Unit c, Kept kept[KEPT], double *t)
         break;
     case 22: status = (int)RATES(c, x, N_STATES); check(status, x, N_STATES, "rates"); break;
     default:
-        status = draw(2) ? (int)JACOBIAN(c, vr, n, other, m, w, v) : (int)ADJOINT(c, vr, m, other, n, w, v);
-        check(status, v, n, "sensitivity");
+        if (draw(2)) {
+            status = (int)JACOBIAN(c, vr, n, other, m, w, v);
+            check(status, v, elements(vr, n), "sensitivity");
+        } else {
+            status = (int)ADJOINT(c, vr, m, other, n, w, v);
+            check(status, v, elements(other, n), "sensitivity");
+        }
         break;
     }
     count(which, status);
@@ -285,7 +312,8 @@ int main(int argc, char **argv)
         if (draw(4)) { /* most runs get through initialization */
             const unsigned state = FIRST_STATE + (unsigned)draw(N_STATES);
             const double start = 0.5;
-            SET_REALS(c, &state, 1, &start);
+            if (elements(&state, 1) == 1)
+                SET_REALS(c, &state, 1, &start);
             initialize(c);
             CALL(ExitInitializationMode)(c);
             if (me && draw(2)) {

@@ -4,23 +4,27 @@
 
 #include "instance.h"
 
-static Status check_references(Instance *instance, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[],
-                      size_t n_knowns)
+/* Checks references of real variables: outputs and states, or all others. */
+static Status check_selection(const Instance *instance, Selection of, bool unknown)
+{
+    const char *kinds = unknown ? "output, state or derivative" : "input, state, parameter or time";
+
+    for (size_t i = 0; i < of.n; i++) {
+        const Variable *v = of.references[i] < N_VARIABLES ? &VARIABLES[of.references[i]] : NULL;
+        if (!v || v->type != TYPE_REAL || !(unknown ? v->role == OUTPUT || v->role == STATE : v->role != OUTPUT))
+            return instance_refuse(instance, "value reference %u is no real %s", of.references[i], kinds);
+    }
+    return instance_check_count(instance, TYPE_REAL, of.references, of.n, of.n_values);
+}
+
+static Status check_references(Instance *instance, Selection unknowns, Selection knowns)
 {
     if (!COMPONENT.tangent)
         return instance_unsupported(instance, "derivatives");
     if (instance_require(instance, ~(unsigned)MODE_INSTANTIATED, "derivatives") != STATUS_OK)
         return STATUS_ERROR;
-    for (size_t i = 0; i < n_unknowns; i++) {
-        const Variable *v = unknowns[i] < N_VARIABLES ? &VARIABLES[unknowns[i]] : NULL;
-        if (!v || v->type != TYPE_REAL || !(v->role == OUTPUT || v->role == STATE))
-            return instance_refuse(instance, "value reference %u is no real output, state or derivative", unknowns[i]);
-    }
-    for (size_t i = 0; i < n_knowns; i++) {
-        const Variable *v = knowns[i] < N_VARIABLES ? &VARIABLES[knowns[i]] : NULL;
-        if (!v || v->type != TYPE_REAL || v->role == OUTPUT)
-            return instance_refuse(instance, "value reference %u is no real input, state, parameter or time", knowns[i]);
-    }
+    if (check_selection(instance, unknowns, true) != STATUS_OK || check_selection(instance, knowns, false) != STATUS_OK)
+        return STATUS_ERROR;
     return instance_update(instance);
 }
 
@@ -29,41 +33,45 @@ static int is_initializing(const Instance *instance)
     return instance->mode == MODE_INITIALIZING;
 }
 
-Status instance_directional_derivative(Instance *instance, const unsigned unknowns[], size_t n_unknowns,
-                                       const unsigned knowns[], size_t n_knowns, const double seed[],
+/* Iterates over the elements of a selection, as variables v. */
+#define FOR_EACH_ELEMENT(of, v)                     \
+    for (size_t i_##v = 0; i_##v < (of).n; i_##v++) \
+        for (const Variable *v = &VARIABLES[(of).references[i_##v]], *end_##v = v + v->size; v < end_##v; v++)
+
+Status instance_directional_derivative(Instance *instance, Selection unknowns, Selection knowns, const double seed[],
                                        double sensitivity[])
 {
     Model direction, tangent;
 
-    if (check_references(instance, unknowns, n_unknowns, knowns, n_knowns) != STATUS_OK)
+    if (check_references(instance, unknowns, knowns) != STATUS_OK)
         return STATUS_ERROR;
     memset(&direction, 0, sizeof direction);
-    for (size_t i = 0; i < n_knowns; i++)
-        *variable_real(&direction, &VARIABLES[knowns[i]]) += seed[i];
+    FOR_EACH_ELEMENT(knowns, known)
+        *variable_real(&direction, known) += *seed++;
     COMPONENT.tangent(&instance->model, &direction, is_initializing(instance), &tangent);
-    for (size_t i = 0; i < n_unknowns; i++)
-        sensitivity[i] = *variable_real(&tangent, &VARIABLES[unknowns[i]]);
+    FOR_EACH_ELEMENT(unknowns, unknown)
+        *sensitivity++ = *variable_real(&tangent, unknown);
     return STATUS_OK;
 }
 
 /* One tangent for each known: exact, and no second set of formulas. */
-Status instance_adjoint_derivative(Instance *instance, const unsigned unknowns[], size_t n_unknowns,
-                                   const unsigned knowns[], size_t n_knowns, const double seed[],
+Status instance_adjoint_derivative(Instance *instance, Selection unknowns, Selection knowns, const double seed[],
                                    double sensitivity[])
 {
     Model direction, tangent;
 
-    if (check_references(instance, unknowns, n_unknowns, knowns, n_knowns) != STATUS_OK)
+    if (check_references(instance, unknowns, knowns) != STATUS_OK)
         return STATUS_ERROR;
     memset(&direction, 0, sizeof direction);
-    for (size_t i = 0; i < n_knowns; i++) {
-        double *component = variable_real(&direction, &VARIABLES[knowns[i]]);
+    FOR_EACH_ELEMENT(knowns, known) {
+        double *component = variable_real(&direction, known), sum = 0.0;
+        const double *weight = seed;
         *component = 1.0;
         COMPONENT.tangent(&instance->model, &direction, is_initializing(instance), &tangent);
         *component = 0.0;
-        sensitivity[i] = 0.0;
-        for (size_t j = 0; j < n_unknowns; j++)
-            sensitivity[i] += seed[j] * *variable_real(&tangent, &VARIABLES[unknowns[j]]);
+        FOR_EACH_ELEMENT(unknowns, unknown)
+            sum += *weight++ * *variable_real(&tangent, unknown);
+        *sensitivity++ = sum;
     }
     return STATUS_OK;
 }

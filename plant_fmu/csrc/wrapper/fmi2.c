@@ -75,13 +75,13 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component instance)
 fmi2Status fmi2GetReal(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
 {
     REFUSE_NULL(nvr, vr, value);
-    return (fmi2Status)instance_get_reals(instance, vr, nvr, value);
+    return (fmi2Status)instance_get_reals(instance, vr, nvr, value, nvr);
 }
 
 fmi2Status fmi2SetReal(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[])
 {
     REFUSE_NULL(nvr, vr, value);
-    return (fmi2Status)instance_set_reals(instance, vr, nvr, value);
+    return (fmi2Status)instance_set_reals(instance, vr, nvr, value, nvr);
 }
 
 #define INTEGERS(type, Type)                                                                                              \
@@ -112,7 +112,8 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component instance, const fmi2ValueR
 {
     REFUSE_NULL(nUnknown, vUnknown_ref, dvUnknown);
     REFUSE_NULL(nKnown, vKnown_ref, dvKnown);
-    return (fmi2Status)instance_directional_derivative(instance, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown);
+    const Selection unknowns = {vUnknown_ref, nUnknown, nUnknown}, knowns = {vKnown_ref, nKnown, nKnown};
+    return (fmi2Status)instance_directional_derivative(instance, unknowns, knowns, dvKnown, dvUnknown);
 }
 
 /* ---- co-simulation ----------------------------------------------------------------------------------------- */
@@ -152,11 +153,11 @@ fmi2Status fmi2EnterEventMode(fmi2Component instance)
 fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *fmi2eventInfo)
 {
     REFUSE_NULL(1, fmi2eventInfo);
-    bool changed = false;
+    bool again = false, changed = false;
     double next = INFINITY;
-    const Status status = instance_update_discrete(instance, &changed, &next);
+    const Status status = instance_update_discrete(instance, &again, &changed, &next);
 
-    fmi2eventInfo->newDiscreteStatesNeeded = fmi2False;
+    fmi2eventInfo->newDiscreteStatesNeeded = again ? fmi2True : fmi2False;
     fmi2eventInfo->terminateSimulation = fmi2False;
     fmi2eventInfo->nominalsOfContinuousStatesChanged = fmi2False;
     fmi2eventInfo->valuesOfContinuousStatesChanged = changed ? fmi2True : fmi2False;

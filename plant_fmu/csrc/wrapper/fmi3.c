@@ -31,13 +31,18 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3InstanceEnvironment instanceEnvironment, fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
-    (void)resourcePath, (void)visible, (void)earlyReturnAllowed, (void)intermediateUpdate;
+    (void)resourcePath, (void)visible, (void)intermediateUpdate;
     if (nRequiredIntermediateVariables > 0 && !requiredIntermediateVariables)
         return refuse_instance(instanceEnvironment, logMessage, "requiredIntermediateVariables is NULL");
-    if (eventModeUsed)
+    if (eventModeUsed && N_CLOCK_VARIABLES == 0)
         return refuse_instance(instanceEnvironment, logMessage, "this FMU has no event mode in co-simulation (eventModeUsed)");
-    return instance_create(instanceName, instantiationToken, CO_SIMULATION, loggingOn, log_message, instanceEnvironment,
-                           (void (*)(void))logMessage);
+    Instance *instance = instance_create(instanceName, instantiationToken, CO_SIMULATION, loggingOn, log_message,
+                                         instanceEnvironment, (void (*)(void))logMessage);
+    if (instance) { /* without event mode sensors sample at their own times, unseen */
+        instance->has_event_mode = eventModeUsed;
+        instance->returns_early = eventModeUsed && earlyReturnAllowed;
+    }
+    return instance;
 }
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
@@ -79,18 +84,14 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
                           fmi3Float64 values[], size_t nValues)
 {
     REFUSE_NULL(nValueReferences, valueReferences, values);
-    if (nValues != nValueReferences)
-        return (fmi3Status)instance_refuse(instance, "fmi3GetFloat64: all variables are scalars");
-    return (fmi3Status)instance_get_reals(instance, valueReferences, nValueReferences, values);
+    return (fmi3Status)instance_get_reals(instance, valueReferences, nValueReferences, values, nValues);
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           const fmi3Float64 values[], size_t nValues)
 {
     REFUSE_NULL(nValueReferences, valueReferences, values);
-    if (nValues != nValueReferences)
-        return (fmi3Status)instance_refuse(instance, "fmi3SetFloat64: all variables are scalars");
-    return (fmi3Status)instance_set_reals(instance, valueReferences, nValueReferences, values);
+    return (fmi3Status)instance_set_reals(instance, valueReferences, nValueReferences, values, nValues);
 }
 
 #define INTEGERS(type, Type)                                                                                          \
@@ -98,14 +99,15 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
                              size_t nValueReferences, fmi3##type values[], size_t nValues)                            \
     {                                                                                                                 \
         REFUSE_NULL(nValueReferences, valueReferences, values);                                                       \
-        if (nValues != nValueReferences)                                                                              \
-            return (fmi3Status)instance_refuse(instance, "fmi3Get" #type ": all variables are scalars");              \
-        for (size_t i = 0; i < nValueReferences; i++) {                                                               \
-            int value = 0;                                                                                            \
-            if (instance_get_integer(instance, Type, valueReferences[i], &value) != STATUS_OK)                        \
-                return fmi3Error;                                                                                     \
-            values[i] = (fmi3##type)value;                                                                            \
-        }                                                                                                             \
+        if (instance_check_count(instance, Type, valueReferences, nValueReferences, nValues) != STATUS_OK)            \
+            return fmi3Error;                                                                                         \
+        for (size_t i = 0; i < nValueReferences; i++)                                                                 \
+            for (unsigned vr = valueReferences[i], end = vr + VARIABLES[vr].size; vr < end; vr++) {                   \
+                int value = 0;                                                                                        \
+                if (instance_get_integer(instance, Type, vr, &value) != STATUS_OK)                                    \
+                    return fmi3Error;                                                                                 \
+                *values++ = (fmi3##type)value;                                                                        \
+            }                                                                                                         \
         return fmi3OK;                                                                                                \
     }                                                                                                                 \
                                                                                                                       \
@@ -113,23 +115,26 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
                              size_t nValueReferences, const fmi3##type values[], size_t nValues)                      \
     {                                                                                                                 \
         REFUSE_NULL(nValueReferences, valueReferences, values);                                                       \
-        if (nValues != nValueReferences)                                                                              \
-            return (fmi3Status)instance_refuse(instance, "fmi3Set" #type ": all variables are scalars");              \
+        if (instance_check_count(instance, Type, valueReferences, nValueReferences, nValues) != STATUS_OK)            \
+            return fmi3Error;                                                                                         \
         for (size_t i = 0; i < nValueReferences; i++)                                                                 \
-            if (instance_set_integer(instance, Type, valueReferences[i], values[i]) != STATUS_OK)                     \
-                return fmi3Error;                                                                                     \
+            for (unsigned vr = valueReferences[i], end = vr + VARIABLES[vr].size; vr < end; vr++)                     \
+                if (instance_set_integer(instance, Type, vr, *values++) != STATUS_OK)                                 \
+                    return fmi3Error;                                                                                 \
         return fmi3OK;                                                                                                \
     }
 
 INTEGERS(Int32, TYPE_INTEGER)
 INTEGERS(Boolean, TYPE_BOOLEAN)
 
-static Status require_scalars(const Instance *instance, size_t nUnknowns, size_t nKnowns, size_t nSeed,
-                              size_t nSensitivity)
+fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                        fmi3Clock values[])
 {
-    if (nSeed == nKnowns && nSensitivity == nUnknowns)
-        return STATUS_OK;
-    return instance_refuse(instance, "derivatives: all variables are scalars");
+    REFUSE_NULL(nValueReferences, valueReferences, values);
+    for (size_t i = 0; i < nValueReferences; i++)
+        if (instance_get_clock(instance, valueReferences[i], &values[i]) != STATUS_OK)
+            return fmi3Error;
+    return fmi3OK;
 }
 
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
@@ -138,9 +143,8 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
 {
     REFUSE_NULL(nUnknowns, unknowns, sensitivity);
     REFUSE_NULL(nKnowns, knowns, seed);
-    if (require_scalars(instance, nUnknowns, nKnowns, nSeed, nSensitivity) != STATUS_OK)
-        return fmi3Error;
-    return (fmi3Status)instance_directional_derivative(instance, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
+    return (fmi3Status)instance_directional_derivative(instance, (Selection){unknowns, nUnknowns, nSensitivity},
+                                                       (Selection){knowns, nKnowns, nSeed}, seed, sensitivity);
 }
 
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
@@ -149,9 +153,8 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
 {
     REFUSE_NULL(nUnknowns, unknowns, seed);
     REFUSE_NULL(nKnowns, knowns, sensitivity);
-    if (require_scalars(instance, nKnowns, nUnknowns, nSeed, nSensitivity) != STATUS_OK)
-        return fmi3Error;
-    return (fmi3Status)instance_adjoint_derivative(instance, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
+    return (fmi3Status)instance_adjoint_derivative(instance, (Selection){unknowns, nUnknowns, nSeed},
+                                                   (Selection){knowns, nKnowns, nSensitivity}, seed, sensitivity);
 }
 
 /* ---- co-simulation ------------------------------------------------------------------------------------------ */
@@ -163,18 +166,26 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     REFUSE_NULL(1, eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime);
     (void)noSetFMUStatePriorToCurrentPoint;
     const Status status = instance_step(instance, currentCommunicationPoint, communicationStepSize);
-    *eventHandlingNeeded = fmi3False;
+    const Instance *stepped = instance;
+    *eventHandlingNeeded = stepped->has_event_mode && variables_has_ticked(&stepped->model);
     *terminateSimulation = fmi3False;
-    *earlyReturn = fmi3False;
-    *lastSuccessfulTime = ((const Instance *)instance)->model.time;
+    *earlyReturn = *eventHandlingNeeded && stepped->model.time < currentCommunicationPoint + communicationStepSize;
+    *lastSuccessfulTime = stepped->model.time;
     return (fmi3Status)status;
 }
 
-/* ---- model exchange ---------------------------------------------------------------------------------------- */
+/* ---- events, and model exchange ---------------------------------------------------------------------------- */
 
 fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 {
-    return (fmi3Status)instance_enter_event_mode(instance, MODE_CONTINUOUS);
+    REFUSE_NULL(1, instance);
+    const unsigned stepping = ((const Instance *)instance)->has_event_mode ? MODE_STEPPING : 0;
+    return (fmi3Status)instance_enter_event_mode(instance, MODE_CONTINUOUS | stepping);
+}
+
+fmi3Status fmi3EnterStepMode(fmi3Instance instance)
+{
+    return (fmi3Status)instance_enter_step_mode(instance);
 }
 
 /* Does nothing: all is evaluated already. No flag offers it, but importers may call it. */
@@ -190,11 +201,11 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
 {
     REFUSE_NULL(1, discreteStatesNeedUpdate, terminateSimulation, nominalsOfContinuousStatesChanged,
                 valuesOfContinuousStatesChanged, nextEventTimeDefined, nextEventTime);
-    bool changed = false;
+    bool again = false, changed = false;
     double next = INFINITY;
-    const Status status = instance_update_discrete(instance, &changed, &next);
+    const Status status = instance_update_discrete(instance, &again, &changed, &next);
 
-    *discreteStatesNeedUpdate = fmi3False;
+    *discreteStatesNeedUpdate = again;
     *terminateSimulation = fmi3False;
     *nominalsOfContinuousStatesChanged = fmi3False;
     *valuesOfContinuousStatesChanged = changed;

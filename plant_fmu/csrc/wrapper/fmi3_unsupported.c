@@ -43,8 +43,6 @@ UNSUPPORTED_FOR_ALL(fmi3GetBinary, (fmi3Instance instance, const fmi3ValueRefere
                             fmi3Binary v[], size_t nv), (void)r, (void)sizes, (void)v, (void)nv)
 UNSUPPORTED_FOR_ALL(fmi3SetBinary, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, const size_t sizes[],
                             const fmi3Binary v[], size_t nv), (void)r, (void)sizes, (void)v, (void)nv)
-UNSUPPORTED_FOR_ALL(fmi3GetClock, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, fmi3Clock v[]),
-            (void)r, (void)v)
 UNSUPPORTED_FOR_ALL(fmi3SetClock, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, const fmi3Clock v[]),
             (void)r, (void)v)
 UNSUPPORTED(fmi3GetNumberOfVariableDependencies, (fmi3Instance instance, fmi3ValueReference r, size_t *n),
@@ -55,7 +53,6 @@ UNSUPPORTED(fmi3GetVariableDependencies, (fmi3Instance instance, fmi3ValueRefere
             (void)dependent, (void)elements, (void)independents, (void)independentElements, (void)kinds, (void)n)
 UNSUPPORTED(fmi3EnterConfigurationMode, (fmi3Instance instance), (void)0)
 UNSUPPORTED(fmi3ExitConfigurationMode, (fmi3Instance instance), (void)0)
-UNSUPPORTED(fmi3EnterStepMode, (fmi3Instance instance), (void)0)
 UNSUPPORTED_FOR_ALL(fmi3GetIntervalDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                      fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[]),
             (void)r, (void)intervals, (void)qualifiers)

@@ -96,7 +96,8 @@ Status instance_require(const Instance *instance, unsigned modes, const char *ac
         return STATUS_ERROR;
     if ((unsigned)instance->mode & modes)
         return STATUS_OK;
-    const unsigned others = instance->kind == CO_SIMULATION ? MODE_EVENT | MODE_CONTINUOUS : MODE_STEPPING;
+    const unsigned events = instance->has_event_mode ? 0 : MODE_EVENT;
+    const unsigned others = instance->kind == CO_SIMULATION ? events | MODE_CONTINUOUS : MODE_STEPPING;
     if (!(modes & ~others))
         return instance_refuse(instance, "%s: not offered in %s", action,
                                instance->kind == CO_SIMULATION ? "co-simulation" : "model exchange");
@@ -254,7 +255,7 @@ Status instance_exit_initialization(Instance *instance)
     instance->unprepared = true;
     if (instance_prepare(instance) != STATUS_OK || (COMPONENT.begin && COMPONENT.begin(instance) != STATUS_OK))
         return STATUS_ERROR;
-    instance->mode = instance->kind == CO_SIMULATION ? MODE_STEPPING : MODE_EVENT;
+    instance->mode = instance->kind == CO_SIMULATION && !instance->has_event_mode ? MODE_STEPPING : MODE_EVENT;
     instance->outdated = true;
     instance_log(instance, LOG_EVENTS, "initialized at t = %.9g s", instance->model.time);
     return STATUS_OK;

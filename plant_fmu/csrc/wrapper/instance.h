@@ -18,20 +18,21 @@ typedef enum {
     MODE_INSTANTIATED = 1,
     MODE_INITIALIZING = 2,
     MODE_STEPPING = 4,    /* co-simulation */
-    MODE_EVENT = 8,       /* model exchange */
+    MODE_EVENT = 8,       /* model exchange, and co-simulation with clocks */
     MODE_CONTINUOUS = 16, /* model exchange */
     MODE_TERMINATED = 32
 } Mode; /* bits, so that a call can name all the modes in which it is allowed */
 
 typedef enum { LOG_EVENTS = 1, LOG_WARNINGS = 2, LOG_DISCARDS = 4, LOG_ERRORS = 8, LOG_ALL = 15 } LogCategories;
 
-typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_BOOLEAN } Type;
+typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_BOOLEAN, TYPE_CLOCK } Type;
 typedef enum { TIME, STATE, INPUT, OUTPUT, PARAMETER } Role;
 
 typedef struct {
     const char *name;
-    Type type; /* a real variable is a double, the others are int */
+    Type type; /* a real variable is a double, the others are int; a clock is an output */
     Role role;
+    unsigned size; /* elements from here on of the array that begins here; 1: a scalar, 0: within an array */
     size_t offset; /* into Model */
     double start, min, max, nominal;
 } Variable;
@@ -46,6 +47,8 @@ struct Instance {
     bool refused;         /* invalid experiment times: no initialization until valid ones are set */
     bool unprepared;      /* parameters changed since the component was prepared */
     bool outdated;        /* outputs are older than the state, the inputs or the parameters */
+    bool has_event_mode;  /* co-simulation: the importer handles events */
+    bool returns_early;   /* and steps end where a clock ticks */
     unsigned categories;  /* enabled LogCategories */
     char *name;
     LogCallback *log;
@@ -123,8 +126,17 @@ int *variable_integer(Model *model, const Variable *variable);
 /* Sets every variable except outputs to its start value, and everything else to zero. */
 void variables_start(Model *model);
 
-Status instance_get_reals(Instance *instance, const unsigned references[], size_t n, double values[]);
-Status instance_set_reals(Instance *instance, const unsigned references[], size_t n, const double values[]);
+/* True if a clock has ticked since they were cleared. */
+bool variables_has_ticked(const Model *model);
+void variables_clear_clocks(Model *model);
+
+/* Checks the references of variables of a type, and that there is a value for each of their elements. */
+Status instance_check_count(const Instance *instance, Type type, const unsigned references[], size_t n, size_t n_values);
+
+/* Values are those of all elements, side by side. */
+Status instance_get_reals(Instance *instance, const unsigned references[], size_t n, double values[], size_t n_values);
+Status instance_set_reals(Instance *instance, const unsigned references[], size_t n, const double values[], size_t n_values);
+/* A reference may be that of an element. */
 Status instance_get_integer(Instance *instance, Type type, unsigned reference, int *value);
 Status instance_set_integer(Instance *instance, Type type, unsigned reference, int value);
 
@@ -140,7 +152,11 @@ Status instance_step(Instance *instance, double time, double step);
 /* Enters event mode, which is allowed in the modes `from`. */
 Status instance_enter_event_mode(Instance *instance, unsigned from);
 Status instance_enter_continuous_mode(Instance *instance);
-Status instance_update_discrete(Instance *instance, bool *states_changed, double *next_event_time);
+Status instance_enter_step_mode(Instance *instance);
+/* Deactivates the clocks; sets `again` if one ticks in this very call. */
+Status instance_update_discrete(Instance *instance, bool *again, bool *states_changed, double *next_event_time);
+/* A clock is active in event mode, from its tick to the update. */
+Status instance_get_clock(Instance *instance, unsigned reference, bool *active);
 Status instance_set_time(Instance *instance, double time);
 Status instance_set_states(Instance *instance, const double states[], size_t n);
 Status instance_get_states(Instance *instance, double states[], size_t n);
@@ -149,14 +165,18 @@ Status instance_get_nominals(Instance *instance, double nominals[], size_t n);
 
 /* ---- derivatives.c ---- */
 
+/* Variables, and how many values they have together. */
+typedef struct {
+    const unsigned *references;
+    size_t n, n_values;
+} Selection;
+
 /* sensitivity = J seed, with J the partial derivatives of the unknowns with respect to the knowns. */
-Status instance_directional_derivative(Instance *instance, const unsigned unknowns[], size_t n_unknowns,
-                                       const unsigned knowns[], size_t n_knowns, const double seed[],
+Status instance_directional_derivative(Instance *instance, Selection unknowns, Selection knowns, const double seed[],
                                        double sensitivity[]);
 
 /* sensitivity = J^T seed. */
-Status instance_adjoint_derivative(Instance *instance, const unsigned unknowns[], size_t n_unknowns,
-                                   const unsigned knowns[], size_t n_knowns, const double seed[],
+Status instance_adjoint_derivative(Instance *instance, Selection unknowns, Selection knowns, const double seed[],
                                    double sensitivity[]);
 
 /* ---- saved.c: FMU states ---- */

@@ -73,6 +73,8 @@ Status instance_restore(Instance *instance, const Saved *saved)
         return STATUS_ERROR;
     if (saved->kind != (int32_t)instance->kind)
         return instance_refuse(instance, "FMU state is of the other interface (co-simulation or model exchange)");
+    if (saved->kind == CO_SIMULATION && saved->mode == MODE_EVENT && !instance->has_event_mode)
+        return instance_refuse(instance, "FMU state is in event mode, which this instance does not use");
     memcpy(&instance->model, &saved->model, sizeof instance->model);
     instance->mode = (Mode)saved->mode;
     instance->unprepared = saved->unprepared != 0;
@@ -128,7 +130,8 @@ static Status check_content(const Instance *instance, const Saved *saved)
     const int32_t modes[] = {MODE_INSTANTIATED, MODE_INITIALIZING, MODE_TERMINATED, MODE_STEPPING, MODE_EVENT, MODE_CONTINUOUS};
     bool known = false; /* each of the last three belongs to one interface */
     for (int i = 0; i < 6; i++)
-        known = known || (saved->mode == modes[i] && (i < 3 || (i == 3) == (saved->kind == CO_SIMULATION)));
+        known = known || (saved->mode == modes[i] && (i < 3 || (i == 3) == (saved->kind == CO_SIMULATION) ||
+                                                      (i == 4 && N_CLOCK_VARIABLES > 0)));
     valid = valid && known;
     return valid ? STATUS_OK : instance_refuse(instance, "serialized FMU state is invalid: a time, mode or held value is out of range");
 }

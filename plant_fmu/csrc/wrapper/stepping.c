@@ -32,11 +32,12 @@ Status instance_step(Instance *instance, double time, double step)
     if (instance_require(instance, MODE_STEPPING, "stepping") != STATUS_OK || instance_prepare(instance) != STATUS_OK ||
         check_step(instance, time, step) != STATUS_OK)
         return STATUS_ERROR;
+    variables_clear_clocks(&instance->model); /* of an importer that does not handle events */
     instance->outdated = true;
     return COMPONENT.advance(instance, time + step);
 }
 
-/* ---- model exchange ---------------------------------------------------------------------------------------- */
+/* ---- events, and model exchange ---------------------------------------------------------------------------- */
 
 /* Returns the address of the contiguous states, or of their derivatives. */
 static double *states_address(Model *model, int first)
@@ -62,25 +63,52 @@ Status instance_enter_event_mode(Instance *instance, unsigned from)
     return STATUS_OK;
 }
 
-Status instance_enter_continuous_mode(Instance *instance)
+static Status leave_event_mode(Instance *instance, Interface kind, Mode mode, const char *action)
 {
-    if (instance_require(instance, MODE_EVENT, "entering continuous-time mode") != STATUS_OK ||
+    if (instance_require(instance, instance && instance->kind == kind ? MODE_EVENT : 0, action) != STATUS_OK ||
         instance_update(instance) != STATUS_OK) /* sets the discrete outputs for the next interval */
         return STATUS_ERROR;
-    instance->mode = MODE_CONTINUOUS;
+    instance->mode = mode;
     return STATUS_OK;
 }
 
-Status instance_update_discrete(Instance *instance, bool *states_changed, double *next_event_time)
+Status instance_enter_continuous_mode(Instance *instance)
+{
+    return leave_event_mode(instance, MODEL_EXCHANGE, MODE_CONTINUOUS, "entering continuous-time mode");
+}
+
+Status instance_enter_step_mode(Instance *instance)
+{
+    return leave_event_mode(instance, CO_SIMULATION, MODE_STEPPING, "entering step mode");
+}
+
+Status instance_get_clock(Instance *instance, unsigned reference, bool *active)
+{
+    if (instance_check_count(instance, TYPE_CLOCK, &reference, 1, 1) != STATUS_OK)
+        return STATUS_ERROR;
+    *active = false;
+    if (instance->mode != MODE_EVENT)
+        return STATUS_OK;
+    if (instance_prepare(instance) != STATUS_OK)
+        return STATUS_ERROR;
+    if (COMPONENT.tick(&instance->model)) /* in model exchange they tick now, or with the update */
+        instance->outdated = true;
+    *active = *variable_integer(&instance->model, &VARIABLES[reference]) != 0;
+    return STATUS_OK;
+}
+
+Status instance_update_discrete(Instance *instance, bool *again, bool *states_changed, double *next_event_time)
 {
     Model *m = &instance->model;
 
     if (instance_require(instance, MODE_EVENT, "updating discrete states") != STATUS_OK ||
         instance_prepare(instance) != STATUS_OK)
         return STATUS_ERROR;
-    *states_changed = COMPONENT.apply_unlagged(m) != 0;
+    variables_clear_clocks(m);
+    *states_changed = COMPONENT.apply_unlagged(m) != 0 && instance->kind == MODEL_EXCHANGE;
     if (COMPONENT.tick(m))
         instance_log(instance, LOG_EVENTS, "sampled at t = %.9g s", m->time);
+    *again = variables_has_ticked(m);
     *next_event_time = COMPONENT.next_tick(m);
     instance->outdated = true;
     return STATUS_OK;
@@ -88,7 +116,8 @@ Status instance_update_discrete(Instance *instance, bool *states_changed, double
 
 Status instance_set_time(Instance *instance, double time)
 {
-    if (instance_require(instance, MODE_EVENT | MODE_CONTINUOUS, "setting the time") != STATUS_OK)
+    const unsigned modes = instance && instance->kind == MODEL_EXCHANGE ? MODE_EVENT | MODE_CONTINUOUS : 0;
+    if (instance_require(instance, modes, "setting the time") != STATUS_OK)
         return STATUS_ERROR;
     if (!(fabs(time) <= MAX_TIME))
         return instance_refuse(instance, "time is %g s, expected a number within %g", time, MAX_TIME);

@@ -11,7 +11,7 @@ const Variable VARIABLES[] = {COMPONENT_VARIABLES};
 const unsigned N_VARIABLES = sizeof VARIABLES / sizeof VARIABLES[0];
 const char TOKEN[] = INSTANTIATION_TOKEN;
 
-static const char *const TYPE_NAMES[] = {"real", "Integer", "Boolean"};
+static const char *const TYPE_NAMES[] = {"real", "Integer", "Boolean", "clock"};
 
 double *variable_real(Model *model, const Variable *variable)
 {
@@ -37,6 +37,23 @@ void variables_start(Model *model)
     }
 }
 
+/* ---- clocks ------------------------------------------------------------------------------------------------ */
+
+bool variables_has_ticked(const Model *model)
+{
+    bool any = false;
+
+    for (int i = 0; i < (int)N_CLOCK_VARIABLES; i++)
+        any = any || *(const int *)((const char *)model + VARIABLES[FIRST_CLOCK + i].offset);
+    return any;
+}
+
+void variables_clear_clocks(Model *model)
+{
+    for (int i = 0; i < (int)N_CLOCK_VARIABLES; i++)
+        *variable_integer(model, &VARIABLES[FIRST_CLOCK + i]) = 0;
+}
+
 /* ---- reading ----------------------------------------------------------------------------------------------- */
 
 /* Checks that a reference has a type. */
@@ -47,15 +64,32 @@ static Status check_reference(const Instance *instance, Type type, unsigned refe
     return instance_refuse(instance, "value reference %u is no %s variable", reference, TYPE_NAMES[type]);
 }
 
-Status instance_get_reals(Instance *instance, const unsigned references[], size_t n, double values[])
+Status instance_check_count(const Instance *instance, Type type, const unsigned references[], size_t n, size_t n_values)
 {
+    size_t count = 0;
+
+    for (size_t i = 0; i < n; i++) {
+        if (check_reference(instance, type, references[i]) != STATUS_OK)
+            return STATUS_ERROR;
+        count += VARIABLES[references[i]].size;
+    }
+    if (count == n_values)
+        return STATUS_OK;
+    return instance_refuse(instance, "%zu values given, but the variables have %zu elements", n_values, count);
+}
+
+Status instance_get_reals(Instance *instance, const unsigned references[], size_t n, double values[], size_t n_values)
+{
+    if ((N_ARRAYS > 0 || n != n_values) && instance_check_count(instance, TYPE_REAL, references, n, n_values) != STATUS_OK)
+        return STATUS_ERROR;
     for (size_t i = 0; i < n; i++) {
         if (references[i] >= N_VARIABLES || VARIABLES[references[i]].type != TYPE_REAL)
             return check_reference(instance, TYPE_REAL, references[i]);
         const Variable *v = &VARIABLES[references[i]];
         if (instance->outdated && v->role == OUTPUT && instance_update(instance) != STATUS_OK)
             return STATUS_ERROR;
-        values[i] = *variable_real(&instance->model, v);
+        for (const Variable *element = v; element < v + v->size; element++)
+            *values++ = *variable_real(&instance->model, element);
     }
     return STATUS_OK;
 }
@@ -73,13 +107,13 @@ Status instance_get_integer(Instance *instance, Type type, unsigned reference, i
 
 /* ---- writing ----------------------------------------------------------------------------------------------- */
 
-static unsigned modes_to_set(Role role)
+static unsigned modes_to_set(Role role, Interface kind)
 {
     const unsigned start = MODE_INSTANTIATED | MODE_INITIALIZING;
 
     switch (role) {
     case STATE: /* in model exchange also one by one (FMI 3.0.2, 2.3.5 and 3.2.1), as CasADi does */
-        return start | MODE_EVENT | MODE_CONTINUOUS;
+        return kind == CO_SIMULATION ? start : start | MODE_EVENT | MODE_CONTINUOUS;
     case INPUT:
         return start | MODE_STEPPING | MODE_EVENT | MODE_CONTINUOUS;
     default:
@@ -103,8 +137,9 @@ static Status check_value(const Instance *instance, Type type, unsigned referenc
     const Variable *v = &VARIABLES[reference];
     if (v->role == OUTPUT || v->role == TIME)
         return instance_refuse(instance, "%s: is calculated and cannot be set", v->name);
-    if (!(modes_to_set(v->role) & (unsigned)instance->mode))
-        return instance_require(instance, modes_to_set(v->role), v->name);
+    const unsigned modes = modes_to_set(v->role, instance->kind);
+    if (!(modes & (unsigned)instance->mode))
+        return instance_require(instance, modes, v->name);
     if (!isfinite(value))
         return instance_refuse(instance, "%s = %g refused: not a finite number", v->name, isnan(value) ? fabs(value) : value);
     const double bounded = clip(v, value);
@@ -119,15 +154,22 @@ static void note_change(Instance *instance, const Variable *v)
     instance->outdated = true;
 }
 
-Status instance_set_reals(Instance *instance, const unsigned references[], size_t n, const double values[])
+Status instance_set_reals(Instance *instance, const unsigned references[], size_t n, const double values[], size_t n_values)
 {
-    for (size_t i = 0; i < n; i++) /* all or none */
-        if (check_value(instance, TYPE_REAL, references[i], values[i]) != STATUS_OK)
-            return STATUS_ERROR;
-    for (size_t i = 0; i < n; i++) {
-        *variable_real(&instance->model, &VARIABLES[references[i]]) = clip(&VARIABLES[references[i]], values[i]);
-        note_change(instance, &VARIABLES[references[i]]);
+    if ((N_ARRAYS > 0 || n != n_values) && instance_check_count(instance, TYPE_REAL, references, n, n_values) != STATUS_OK)
+        return STATUS_ERROR;
+    const double *value = values;
+    for (size_t i = 0; i < n; i++) { /* all or none */
+        const unsigned size = references[i] < N_VARIABLES ? VARIABLES[references[i]].size : 1;
+        for (unsigned k = 0; k < size; k++)
+            if (check_value(instance, TYPE_REAL, references[i] + k, *value++) != STATUS_OK)
+                return STATUS_ERROR;
     }
+    for (size_t i = 0; i < n; i++)
+        for (const Variable *v = &VARIABLES[references[i]], *end = v + v->size; v < end; v++) {
+            *variable_real(&instance->model, v) = clip(v, *values++);
+            note_change(instance, v);
+        }
     return STATUS_OK;
 }
 
