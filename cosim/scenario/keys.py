@@ -93,7 +93,9 @@ def hint_of_key(name: str, vehicle: object) -> str:
         with contextlib.suppress(PlantFmuError):
             names = (v.name for v in variables(load_vehicle(vehicle)) if v.role == "parameter")
             keys |= {f"plant.parameters.{name.partition('[')[0]}" for name in names}
-    similarity = {key: difflib.SequenceMatcher(None, name[:100], key.rpartition(".")[2]).ratio() for key in sorted(keys)}
+    similarity = {
+        key: difflib.SequenceMatcher(None, name[:100], key.rpartition(".")[2]).ratio() for key in sorted(keys)
+    }
     near = [key for key in sorted(similarity, key=similarity.__getitem__, reverse=True) if similarity[key] >= _SIMILAR]
     return (
         f"did you mean {' or '.join(near[:_MAX_PROPOSED])}?"
