@@ -69,7 +69,12 @@ _WITHOUT_ESTIMATES = _WITHOUT_WEIGHT | {
 def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile: ProfileName = "ardusub") -> Scenario:
     """Return a scenario as the companion flies it: a step is a control period, and the autopilot reports the state."""
     require_no_fmus(scenario, "a real vehicle")
-    for key, value in (("failures", scenario.failures), ("record.lyapunov", scenario.record.lyapunov)):
+    refused = {
+        "failures": scenario.failures,
+        "record.lyapunov": scenario.record.lyapunov,
+        "goal.then": scenario.goal_then,
+    }
+    for key, value in refused.items():
         if value:
             raise RunError(f"{scenario.name}: {key} is set, expected none with a real vehicle")
     period = scenario.time.control

@@ -37,8 +37,8 @@ class Placement:
         shapes = [region.shape for region in (*([scenario.goal_region] if scenario.has_goal else []), *regions)]
         corners = np.array([shape.bounds() for shape in shapes]).reshape(-1, 2, 3)[:, :, :2]
         bounded = corners[np.isfinite(corners).all(axis=(1, 2))]
-        points = np.array([scenario.initial.position, *scenario.goal_then])[:, None, :2]
-        self._corners: Array = np.concatenate([bounded, np.repeat(points, 2, axis=1)])  # (n, 2, 2) m, NE, low and high
+        start = np.tile(scenario.initial.position[:2], (1, 2, 1))
+        self._corners: Array = np.concatenate([bounded, start])  # (n, 2, 2) m, north and east, low and high
 
     def distance(self, position: Array) -> float:
         """Return the minimum horizontal distance [m] of a position [m, NED] from start, goal and bounded regions."""

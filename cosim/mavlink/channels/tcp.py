@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 MAX_CLIENTS = 8
 _CONNECT_TIMEOUT = 3.0  # s, of the first connection
-_RETRY_PERIOD = 2.0  # s, between two later attempts
+_RETRY_PERIOD = 0.2  # s, between two later attempts
 _IN_PROGRESS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
 
 
@@ -90,7 +90,7 @@ class TcpIn(StreamChannel):
 
 
 class TcpOut(SinglePeer):
-    """A client; while there is no server, at first or later, it tries to connect every 2 s."""
+    """A client; while there is no server, at first or later, it tries to connect five times a second."""
 
     def __init__(self, host: str, port: int) -> None:
         self._address = (host, port)

@@ -532,7 +532,8 @@ def test_each_station_that_competes_or_is_ignored_is_warned_of_once(
     link = StandIn(profile=profile, shift=SHIFT)
     begun = 4.0 if profile == "ardusub" else 0.5  # s: an ArduSub's missing parameters are awaited for 3 s
     link.events = [(begun + 0.1 * k, lambda event=event: event(link)) for k, event in enumerate(events)]
-    assert Flight(tmp_path, 1.5, link=link, profile=profile, **options).status == "completed"
+    expected = "dry run" if options.get("dry_run") else "completed"
+    assert Flight(tmp_path, 1.5, link=link, profile=profile, **options).status == expected
     assert [r.getMessage() for r in caplog.records if "station" in r.getMessage()] == warnings
     texts = [m.text for m in link.of_type("STATUSTEXT") if "station" in m.text]
     for text, warning in zip(texts, warnings, strict=True):  # nothing is cut off: what follows the text is advice
@@ -630,6 +631,8 @@ def test_record_holds_the_exchange_with_the_autopilot(tmp_path):
 def test_scenario_keys_of_simulation_only_are_rejected():
     with pytest.raises(RunError, match=r"record\.lyapunov is set"):
         scenario_to_steer(load_scenario("paper", ["record.lyapunov=true"]))
+    with pytest.raises(RunError, match=r"goal\.then is set"):
+        scenario_to_steer(load_scenario("pile-inspection"))
     steered = scenario_to_steer(load_scenario("pipe-inspection"))
     assert steered.time.step == steered.time.control == 0.02 and steered.sensing.exact
 
