@@ -61,7 +61,7 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     yield compute_inputs, (model.inputs, goal, regions, state, 0.0, FLAT, data.signals)
     references = np.zeros(1, np.uint32)
     native = Native(0, 0, 0, 0, references, FLAT, references, FLAT, INTEGERS, FLAT)
-    fmu = FmuCalls(native, 0.01, INTEGERS, INTEGERS, FLAT, FLAT)
+    fmu = FmuCalls(native, 0.01, INTEGERS, INTEGERS, FLAT)
     component = ComponentCalls(fmu, 0, INTEGERS, INTEGERS, FLAT)
     vehicle = VehicleMap(INTEGERS, INTEGERS, np.zeros((1, 2), np.int64), 0, _TABLE, FLAT, FLAT)
     yield call_law, (fmu, model, data, FLAT)

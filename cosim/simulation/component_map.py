@@ -34,7 +34,7 @@ class ComponentMap(NamedTuple):
     fmu: UserFmu
     file: FmuFile
     inputs: dict[str, str]  # signal of each connected input
-    sources: tuple[int, ...]  # index of each of these signals in `FmuCalls.signals`
+    sources: tuple[int, ...]  # index of each of these signals of `cosim.step.fmu_call.signal`
     sent: dict[str, str]  # input of the plant that an output sets, by output
     outputs: tuple[str, ...]  # all outputs, which are columns of the record
     first: int  # index of the first of them in `StepData.component_results`

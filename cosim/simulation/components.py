@@ -15,7 +15,7 @@ from cosim.simulation.fmu_plant import FmuPlant
 from cosim.simulation.loaded_fmu import LoadedFmu
 from cosim.simulation.signals import Signals
 from cosim.simulation.stepped_plant import SteppedPlant
-from cosim.step.fmu_call import ComponentCalls, FmuCalls, empty_signals_of, exchange_component, step_component
+from cosim.step.fmu_call import ComponentCalls, FmuCalls, exchange_component, step_component
 from cosim.step.plant_fmu_call import step_plant_fmu, write_outputs
 from cosim.step.step_model import PLANT_STEP, Array, Integers, StepData, StepModel, register_call, set_call
 
@@ -85,7 +85,7 @@ class Components:
                 raise ScenarioError(f"{one.fmu.key}.outputs.{output} is {target!r}, which the plant has not")
         calls = FmuCalls(
             native, loaded.period, _integers(one.sources),
-            _integers(name in one.received for name in one.outputs), empty_signals_of(data), loaded.progress,
+            _integers(name in one.received for name in one.outputs), loaded.progress,
         )  # fmt: skip
         return ComponentCalls(
             calls, one.first, _integers(one.outputs.index(output) for output in one.sent),

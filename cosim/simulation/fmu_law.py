@@ -14,7 +14,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.fmu_map import connect, law_signals, law_targets, read_fmu_of
 from cosim.simulation.loaded_fmu import LoadedFmu
 from cosim.simulation.signals import Signals
-from cosim.step.fmu_call import FmuCalls, call_law, empty_signals_of
+from cosim.step.fmu_call import FmuCalls, call_law
 from cosim.step.step_model import StepData, StepModel
 from plant_fmu import PlantError
 
@@ -55,7 +55,7 @@ class FmuLaw:
         inputs = connect(self.fmu, self._file, known)
         native = loaded.native(tuple(inputs), self._outputs)
         sources = np.array([known[signal].index for signal in inputs.values()], np.int64)
-        calls = FmuCalls(native, loaded.period, sources, self._targets, empty_signals_of(data), loaded.progress)
+        calls = FmuCalls(native, loaded.period, sources, self._targets, loaded.progress)
         return BoundCall(call_law, (calls, model, data, forces))
 
     def raise_error(self) -> None:

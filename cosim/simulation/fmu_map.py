@@ -36,7 +36,7 @@ _THRUSTER = re.compile(r"thruster\[(\d+)\]")
 class Signal:
     """A signal that an FMU can receive or set."""
 
-    index: int  # in `FmuCalls.signals`
+    index: int  # of `cosim.step.fmu_call.signal`
     unit: str | None  # None: any unit
     definition: Definition | None = None  # definition of a unit that an FMU of the user's defines
 
@@ -83,7 +83,7 @@ def _numbered(columns: Sequence[Column], first: int) -> Iterator[tuple[int, tupl
 
 
 def _own_signals(scenario: Scenario) -> dict[str, Signal]:
-    """Return the signals that laws receive, in the order of `FmuCalls.signals`."""
+    """Return the signals that laws receive, in the order of `cosim.step.fmu_call.signal`."""
     regions = {"goal": scenario.goal, **{r.region.name: r.region.shape for r in scenario.regions}}
     units: dict[str, str | None] = {
         **MOTION,

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from cosim.step.plant_calls import fmi_do_step, fmi_get, fmi_set
 from cosim.step.region_positions import RegionEvaluation
 from cosim.step.step_model import Array, Integers, StepData, StepModel
@@ -20,10 +18,8 @@ class FmuCalls(NamedTuple):
 
     native: Native  # inputs and outputs that are connected
     period: float  # s, length of its steps
-    sources: Integers  # (i,) index in `signals` of each input
+    sources: Integers  # (i,) index of each input's signal, as `signal` numbers them
     targets: Integers  # (o,) index among forces and estimate of each output
-    signals: Array  # measured motion (13), weights (n), values (n + 1), clearances (n + 1), gradients (3 n + 3),
-    # row, latest outputs of components
     progress: Array  # (4,) steps done; 1 during a step; time of the run at its begin [s]; -1: it failed; n: output
     # n - 1 is not finite
 
@@ -89,9 +85,8 @@ def send(component: ComponentCalls, data: StepData) -> None:
 
 def receive(fmu: FmuCalls, model: StepModel, data: StepData) -> None:
     """Set the inputs of an FMU to their signals."""
-    collect_signals(fmu.signals, model, data)
     for i in range(fmu.sources.size):
-        fmu.native.inputs[i] = fmu.signals[fmu.sources[i]]
+        fmu.native.inputs[i] = signal(model, data, fmu.sources[i])
 
 
 def advance_fmu(fmu: FmuCalls, data: StepData) -> bool:
@@ -110,30 +105,28 @@ def advance_fmu(fmu: FmuCalls, data: StepData) -> bool:
     return ok
 
 
-def empty_signals_of(data: StepData) -> Array:
-    """Return an array for `collect_signals`."""
-    n = data.weights.size
-    return np.zeros(13 + n + 5 * (n + 1) + data.row.size + data.component_results.size)
+def signal(model: StepModel, data: StepData, i: int) -> float:
+    """Return signal `i` of: measured motion (13), weights (n), regions (5 n + 5), row, latest outputs of components."""
+    n, row = data.weights.size, data.row.size
+    first = 18 + 6 * n
+    if i >= first + row:
+        return float(data.component_results[i - first - row])
+    if i >= first:
+        return float(data.row[i - first])
+    if i >= 13 + n:
+        return region_signal(data.true_evaluation if model.exact else data.arbiter_evaluation, i - 13 - n)
+    if i >= 13:
+        return float(data.weights[i - 13])
+    if i >= 7:
+        return float(data.state.velocity_body[i - 7])
+    return float(data.state.quaternion[i - 3] if i >= 3 else data.state.position[i])
 
 
-def collect_signals(signals: Array, model: StepModel, data: StepData) -> None:
-    """Copy what a law receives, the row, and the latest outputs of components side by side."""
-    state, n = data.state, data.weights.size
-    signals[:3], signals[3:7], signals[7:13] = state.position, state.quaternion, state.velocity_body
-    signals[13 : 13 + n] = data.weights
-    first, m = 13 + n, n + 1
-    if model.exact:
-        write_evaluation(signals[first:], data.true_evaluation)
-    else:
-        write_evaluation(signals[first:], data.arbiter_evaluation)
-    first += 5 * m
-    signals[first : first + data.row.size] = data.row
-    signals[first + data.row.size :] = data.component_results
-
-
-def write_evaluation(signals: Array, evaluation: RegionEvaluation) -> None:
-    """Write values, clearances and gradients of goal and regions side by side."""
+def region_signal(evaluation: RegionEvaluation, i: int) -> float:
+    """Return number `i` of values (m), clearances (m) and gradients (3 m) of goal and regions."""
     m = evaluation.values.size
-    signals[:m], signals[m : 2 * m] = evaluation.values, evaluation.clearances
-    for i in range(m):
-        signals[2 * m + 3 * i : 2 * m + 3 * i + 3] = evaluation.gradients[i]
+    if i < m:
+        return float(evaluation.values[i])
+    if i < 2 * m:
+        return float(evaluation.clearances[i - m])
+    return float(evaluation.gradients[(i - 2 * m) // 3, (i - 2 * m) % 3])

@@ -41,6 +41,7 @@ typedef void LogCallback(const Instance *instance, Status status, const char *ca
 
 struct Instance {
     Model model;
+    Model before;         /* of the step, for a component that undoes one */
     Interface kind;
     Mode mode;
     double start_time;    /* s, of the experiment */

@@ -1,7 +1,6 @@
 /* Sensing, regions and law as a component behind the FMI wrappers. A step computes the outputs from the inputs at its
  * beginning; before the first step all outputs are 0. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "instance.h"
@@ -127,15 +126,10 @@ static Status take_step(Instance *instance, double end)
 
 static Status advance(Instance *instance, double end)
 {
-    Model *before = malloc(sizeof *before);
-
-    if (!before)
-        return instance_refuse(instance, "no memory for a step");
-    memcpy(before, &instance->model, sizeof *before);
+    instance->before = instance->model;
     const Status status = take_step(instance, end);
     if (status != STATUS_OK)
-        memcpy(&instance->model, before, sizeof *before);
-    free(before);
+        instance->model = instance->before;
     return status;
 }
 
