@@ -49,20 +49,20 @@ class _BoundedFile(io.BufferedReader):
 
 
 @contextmanager
-def open_fmu(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open an FMU whose files are safe to extract."""
+def open_fmu(path: Path, description: str = DESCRIPTION, what: str = "FMU") -> Iterator[zipfile.ZipFile]:
+    """Open an FMU, or another zip file with a description, whose files are safe to extract."""
     try:
         if path.exists() and not path.is_file() and not path.is_dir():  # to open a pipe would wait for its other end
-            raise FmuFileError(f"{path}: is no FMU: expected a file")
+            raise FmuFileError(f"{path}: is no {what}: expected a file")
         with _BoundedFile(io.FileIO(path)) as source, zipfile.ZipFile(source) as archive:
             _check_members(path, archive)
-            if DESCRIPTION not in archive.namelist():
-                raise FmuFileError(f"{path}: is no FMU: there is no {DESCRIPTION} in it")
+            if description not in archive.namelist():
+                raise FmuFileError(f"{path}: is no {what}: there is no {description} in it")
             yield archive
     except OSError as error:
         raise FmuFileError(f"{path}: {error.strerror or error}") from error
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, ValueError) as error:
-        raise FmuFileError(f"{path}: is no FMU: {error}; expected a whole zip file") from error
+        raise FmuFileError(f"{path}: is no {what}: {error}; expected a whole zip file") from error
 
 
 def unpack(path: Path, folder: Path, platforms: Sequence[str]) -> ET.Element:
@@ -81,7 +81,7 @@ def _is_needed(name: str, platforms: Collection[str]) -> bool:
 def read_description(path: Path, archive: zipfile.ZipFile, platforms: Sequence[str]) -> ET.Element:
     """Return the model description of an open FMU, after a check of all that an importer reads."""
     names = set(archive.namelist())
-    roots = [_parse_member(f"{path}: {name}", archive, name) for name in _DESCRIPTIONS if name in names]
+    roots = [parse_member(f"{path}: {name}", archive, name) for name in _DESCRIPTIONS if name in names]
     validate_description(path, roots[0])
     damaged = archive.testzip()  # reads no more than the sizes it states, and so finds those that lie
     if damaged is not None:
@@ -101,7 +101,7 @@ def terminal_members(path: Path, archive: zipfile.ZipFile) -> dict[str, list[tup
             members.setdefault(member.get("variableName", ""), []).append((*above, member.get("memberName", "")))
 
     if _TERMINALS in archive.namelist():
-        for terminals in _parse_member(f"{path}: {_TERMINALS}", archive, _TERMINALS).iterfind("Terminals"):
+        for terminals in parse_member(f"{path}: {_TERMINALS}", archive, _TERMINALS).iterfind("Terminals"):
             read(terminals, ())
     return members
 
@@ -212,7 +212,8 @@ class _BoundedTreeBuilder(ET.TreeBuilder):
         return super().end(tag)
 
 
-def _parse_member(where: str, archive: zipfile.ZipFile, name: str) -> ET.Element:
+def parse_member(where: str, archive: zipfile.ZipFile, name: str) -> ET.Element:
+    """Return the root of an XML file in an archive, which is not to be changed."""
     size = archive.getinfo(name).file_size
     if size > MAX_XML:
         raise FmuFileError(f"{where} has {size} bytes, expected at most {MAX_XML}")

@@ -8,9 +8,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim.command_line.flags import add_changes, add_run_folder, add_scenario, add_verb, flag, rate, refuse_flags
+from cosim.command_line.flags import add_changes, add_run_folder, add_verb, flag, rate, refuse_flags
 from cosim.command_line.link_flags import add_link_flags, add_live_flag, links_from, open_live
-from cosim.command_line.process import INTERRUPTED, print_run
+from cosim.command_line.process import INTERRUPTED, print_run, say
 from cosim.errors import TelemetryError
 from cosim.report.figure_process import FigureProcess, figure_process
 
@@ -24,9 +24,9 @@ def add_verbs(verbs: Any) -> None:
     verb = add_verb(
         verbs, "run", run, "run a scenario and write its folder", "tutorial",
         ("run docking --out runs/docking", "run paper --set arbiter.engine=closed --set regions.SR1.gain=5000",
-         "run mine.toml --mavlink udpout:127.0.0.1:14550 --commands", "run harbour --live --commands"),
+         "run mine.toml --mavlink udpout:127.0.0.1:14550 --commands", "run harbour --live --commands", "run loop.ssp"),
     )  # fmt: skip
-    add_scenario(verb)
+    verb.add_argument("scenario", help="a shipped name (cosim show lists them), a TOML file, or a system of FMUs, .ssp")
     add_run_folder(verb)
     add_changes(verb, "a key of the scenario, such as law.gains.k_p1=10 or regions.SR1.shape.radius=0.7")
     flag(verb, "--law NAME|FILE", "law such as pd, an .fmu file, or FILE.py:NAME; instead of the scenario's own")
@@ -39,6 +39,8 @@ def add_verbs(verbs: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run ``cosim run``."""
+    if options.scenario.endswith(".ssp"):
+        return _run_system(options)
     import cosim.run.run_scenario  # noqa: F401 -- so that a process to be forked has what it needs
 
     with contextlib.ExitStack() as stack:
@@ -69,6 +71,33 @@ def _run(options: argparse.Namespace, stack: contextlib.ExitStack, drawing: Figu
     else:
         print_run(options, done, not options.no_report)
     return INTERRUPTED if done.summary["status"] == "interrupted" else 0
+
+
+def _run_system(options: argparse.Namespace) -> int:
+    """Run a system of FMUs."""
+    from cosim.io.strict_json import json_text
+    from cosim.results.record import RECORD
+    from cosim.run.run_system import run_system
+
+    others = [
+        "law",
+        "rate",
+        "replay_commands",
+        "live",
+        "mavlink",
+        "commands",
+        "await_arm",
+        "signing_key",
+        "allow_system",
+    ]
+    refuse_flags(options, others, "a scenario with it: a system of FMUs runs alone")
+    folder, summary = run_system(Path(options.scenario), options.out, options.set)
+    if options.json:
+        print(json_text({"folder": str(folder), "summary": summary}), end="")
+    else:
+        say(options, f"{summary['status']}: {summary['steps']} steps, {summary['simulated_time']:g} s")
+        print(folder / RECORD)
+    return INTERRUPTED if summary["status"] == "interrupted" else 0
 
 
 def _json(run: Run) -> str:

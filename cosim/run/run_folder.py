@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import shutil
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -27,8 +27,10 @@ from cosim.results.run_result import COMMANDS_LOG, REPLAY, REPORT, SCENARIO, SUM
 from cosim.scenario.scenario import Scenario
 from plant_fmu.archive import is_temporary, temporary_folder
 
+SYSTEM = "system.ssp"  # copy of a system of FMUs that was run
+
 _OUTPUT_NAMES = frozenset(
-    {SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD, STREAM, SUMMARY, REPORT, REPLAY, FIGURES}
+    {SCENARIO, SYSTEM, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD, STREAM, SUMMARY, REPORT, REPLAY, FIGURES}
 )  # names of the files and folders that a run makes
 
 
@@ -89,11 +91,16 @@ class RunFolder:
 
 def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunFolder:
     """Create the folder of a run and write the scenario into it."""
+    return claim_folder(out, scenario.name, files_of(scenario), overwrite)
+
+
+def claim_folder(out: Path | None, name: str, files: Mapping[str, bytes], overwrite: bool = False) -> RunFolder:
+    """Create the folder of a run with a name, and write some files into it."""
     where = out or Path("runs")
     require_utf8(where.absolute())
     try:
         if out is None:
-            path, created = _new_folder(where, f"{scenario.name}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"), True
+            path, created = _new_folder(where, f"{name}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"), True
         else:
             path, created = out, not out.exists()
             if not created:
@@ -104,8 +111,8 @@ def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunF
         folder = RunFolder(path, created)
         try:
             path.mkdir(parents=True, exist_ok=True)
-            for name, content in files_of(scenario).items():
-                with (path / name).open("xb") as file:
+            for file_name, content in files.items():
+                with (path / file_name).open("xb") as file:
                     file.write(content)
         except FileExistsError as error:  # another run has claimed the folder meanwhile
             raise RunError(f"{path}: is taken by another run") from error

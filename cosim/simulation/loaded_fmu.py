@@ -22,7 +22,7 @@ class LoadedFmu:
         self._watchdog = Watchdog(fmu.label, fmu.timeout)
         self.progress = self._watchdog.progress
         try:
-            self._plant = self._load()
+            self.plant = self._load()
         except BaseException:
             self.close()
             raise
@@ -33,20 +33,20 @@ class LoadedFmu:
 
     def restart(self, fmu: UserFmu, start: Mapping[str, float] | None = None) -> None:
         """Begin again at time 0, with parameters and start values; in a new instance if it cannot be reset."""
-        if self._plant.initialized:
+        if self.plant.initialized:
             try:
-                self._watched(self._plant.reset)
+                self._watched(self.plant.reset)
             except PlantError:
-                self._plant.close()
-                self._plant = self._load()
+                self.plant.close()
+                self.plant = self._load()
         try:
-            self._plant.set(fmu.parameters)
+            self.plant.set(fmu.parameters)
         except PlantError as error:
             raise ScenarioError(f"{fmu.key}.parameters: {error}") from error
-        self._watched(lambda: self._plant.set(start or {}))
-        self._watched(self._plant.initialize)
+        self._watched(lambda: self.plant.set(start or {}))
+        self._watched(self.plant.initialize)
         try:
-            self._plant.prepare_steps(self.period)
+            self.plant.prepare_steps(self.period)
         except PlantError as error:
             raise ScenarioError(f"{self._period_key}: {self.fmu.label}: {error}") from error
         self.progress[:] = 0.0
@@ -63,15 +63,24 @@ class LoadedFmu:
         finally:
             self.progress[BUSY] = 0.0
 
+    def set(self, name: str, value: float) -> None:
+        """Set an input."""
+        self._watched(lambda: self.plant.__setitem__(name, value))
+
+    def step(self, now: float) -> None:
+        """Send the inputs, make a step from `now` [s], and get the outputs, from Python."""
+        self.progress[NOW] = now
+        self._watched(lambda: self.plant.step(self.period))
+
     def native(self, inputs: Sequence[str], outputs: Sequence[str]) -> Native:
         """Return the C functions, with buffers of some variables; the inputs have their present values."""
-        self._native, self._outputs = self._plant.native(tuple(inputs), tuple(outputs)), tuple(outputs)
+        self._native, self._outputs = self.plant.native(tuple(inputs), tuple(outputs)), tuple(outputs)
         self._native.inputs[:] = self.values(inputs)
         return self._native
 
     def values(self, names: Sequence[str]) -> list[float]:
         """Return the present values of real variables."""
-        return [float(self._plant[name]) for name in names]
+        return [float(self.plant[name]) for name in names]
 
     def raise_error(self, expected: str = "a finite number") -> None:
         """Raise the error of the last step, if it failed."""
@@ -80,15 +89,15 @@ class LoadedFmu:
             value, name = self._native.outputs[failed - 1], self._outputs[failed - 1]
             raise PlantError(f"{label}: t = {now:.6g} s: {name} is {value}, expected {expected}")
         if failed < 0:
-            self._plant.count_steps(int(self.progress[STEPS]) - 1)
-            begin = self._plant.time  # the FMU's own, which begins again where a law regains control
+            self.plant.count_steps(int(self.progress[STEPS]) - 1)
+            begin = self.plant.time  # the FMU's own, which begins again where a law regains control
             try:
-                self._plant.raise_failure(self._native)
+                self.plant.raise_failure(self._native)
             except StepError as error:
                 raise PlantError(f"{label}: t = {now + error.time - begin:.6g} s: {error.reason}") from error
 
     def close(self) -> None:
         """Free the FMU. May be called twice."""
         if hasattr(self, "_plant"):
-            self._plant.close()
+            self.plant.close()
         self._watchdog.close()

@@ -6,7 +6,8 @@ Imports: controller, fuzzy_arbiter, plant_fmu, results, scenario, simulation, st
 """
 
 from cosim.ssp.arbiter import arbiter_component
+from cosim.ssp.container import write_container
 from cosim.ssp.controller import controller_component
 from cosim.ssp.system import package_system, plant_component
 
-__all__ = ["arbiter_component", "controller_component", "package_system", "plant_component"]
+__all__ = ["arbiter_component", "controller_component", "package_system", "plant_component", "write_container"]

@@ -23,12 +23,14 @@ from cosim.logs import import_log
 from cosim.logs.column_map import read_map
 from cosim.mavlink.wire.signing import load_key
 from cosim.scenario.scenario import load_scenario
+from cosim.ssp.system_description import read_system
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter import formats as arbiters
 from fuzzy_arbiter.command_line.evaluation import evaluate_table
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.checking.fmu_file import read_fmu
 from plant_fmu.description import model_description
+from tests.cosim.ssp.test_run_system import SSD, SSV
 from tests.fuzzy_arbiter.formats.systems import RICHER
 from tests.security.fuzzing.registry import KINDS, ROOT, SCENES, Case, Seeds, reader
 
@@ -145,7 +147,7 @@ def _refusal(read: Callable[[Path], object], path: Path) -> Exception | None:
     return None
 
 
-@reader("FMU", "zip", "plant_fmu.unpacking:open_fmu", "plant_fmu.unpacking:_parse_member")
+@reader("FMU", "zip", "plant_fmu.unpacking:open_fmu", "plant_fmu.unpacking:parse_member")
 def fmu(seeds: Seeds) -> Case:
     """What `check` refuses, a plant refuses with the same line; it also needs a binary, which these have not."""
 
@@ -182,6 +184,17 @@ def description_run(seeds: Seeds) -> Case:
         Plant(path)
 
     return replace(case, read=read)
+
+
+@reader("system of FMUs", "zip", "cosim.ssp.system_description:read_system")
+def system(seeds: Seeds) -> Case:
+    """Its connections, units and parameters; no FMU of it is read."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("SystemStructure.ssd", SSD)
+        archive.writestr("set.ssv", SSV)
+        archive.writestr("first.fmu", b"")
+    return seeds.file("it.ssp", read_system, made.getvalue())
 
 
 @reader("state of a plant", "bytes", "plant_fmu.running.state:from_bytes")
