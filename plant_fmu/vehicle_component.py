@@ -10,6 +10,7 @@ from plant_fmu.compiling.sources import plant_sources
 from plant_fmu.component import STEP, STOP_TIME, Component
 from plant_fmu.contents import contents
 from plant_fmu.errors import BuildError
+from plant_fmu.former_names import present_name
 from plant_fmu.toml_tables import hint
 from plant_fmu.variables import Variable, described, show_small, variables, with_arrays
 from plant_fmu.vehicle import Vehicle
@@ -49,6 +50,7 @@ def make_vehicle_component(
 def _started(rows: tuple[Variable, ...], start: Mapping[str, float]) -> tuple[Variable, ...]:
     """Return the variables with other start values."""
     settable = {v.name: v for v in rows if v.role in ("state", "input", "parameter")}
+    start = {present_name(name, settable): value for name, value in start.items()}
     for name, value in start.items():
         if name not in settable:
             raise BuildError(f"start value of {name!r}: no such parameter, input or state; {hint(name, settable)}")

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from cosim.errors import RunError
 from cosim.io.format_number import require_format
 from cosim.simulation.signals import Array, Column
+from plant_fmu.former_names import present_name
 
 log = logging.getLogger(__name__)
 
@@ -135,6 +136,7 @@ class Record(Rows):
 
     def __getitem__(self, name: str) -> Array:
         """Return one signal, shape (steps,)."""
+        name = present_name(name, self.units)
         if name not in self.units:
             raise KeyError(name)
         self._keep([name])

@@ -16,6 +16,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Column
 from plant_fmu.checking.fmu_file import NATIVE, FmuFile, read_fmu
 from plant_fmu.errors import PlantFmuError
+from plant_fmu.former_names import present_name
 from plant_fmu.model_variables import ModelVariable
 from plant_fmu.quantities import UNITS, base_unit
 from plant_fmu.toml_tables import hint
@@ -100,12 +101,13 @@ def connect(fmu: UserFmu, file: FmuFile, signals: Mapping[str, Signal]) -> dict[
     for name, signal in fmu.inputs.items():
         key = f"{fmu.key}.inputs.{name}"
         variable = find_variable(file, key, name, "input")
+        signal = present_name(signal, signals)
         if signal not in signals:
             raise ScenarioError(f"{key} is {signal!r}, which is no signal; {hint(signal, signals)}")
         signals[signal].require(key, file, variable)
-    connected = dict(fmu.inputs)
+    connected = {name: present_name(signal, signals) for name, signal in fmu.inputs.items()}
     for variable, names in unmapped(file, "input", fmu.inputs):
-        signal = next((name for name in names if name in signals), "")
+        signal = next((name for name in _present(names, signals) if name in signals), "")
         if signal:
             signals[signal].require(f"{fmu.key}.inputs.{variable.name}", file, variable)
             connected[variable.name] = signal
@@ -120,6 +122,7 @@ def assign(
     for name, target in fmu.outputs.items():
         key = f"{fmu.key}.outputs.{name}"
         variable = find_variable(file, key, name, "output")
+        target = present_name(target, known)
         if target not in known:
             raise ScenarioError(f"{key} is {target!r}, which {what}; {hint(target, known)}")
         if target in (*targets.values(), *taken):
@@ -127,7 +130,8 @@ def assign(
         known[target].require(key, file, variable)
         targets[name] = target
     for variable, names in unmapped(file, "output", fmu.outputs):
-        target = next((name for name in names if name in known and name not in targets.values()), "")
+        free = (name for name in _present(names, known) if name in known and name not in targets.values())
+        target = next(free, "")
         if target in taken:
             raise ScenarioError(f"{fmu.key}.outputs.{variable.name} is {target!r}, which another output sets")
         if target:
@@ -156,7 +160,7 @@ def law_targets(fmu: UserFmu, file: FmuFile, scenario: Scenario) -> tuple[dict[s
 def find_variable(file: FmuFile, key: str, name: str, causality: str = "") -> ModelVariable:
     """Return a real scalar variable that a map names, of a causality if one is given."""
     known = [v.name for v in file.model.values() if v.is_real and v.causality == (causality or v.causality)]
-    variable = file.model.get(name)
+    variable = file.model.get(present_name(name, file.model))
     if variable is None:
         raise ScenarioError(f"{key}: {file.path.name} has no variable of this name; {hint(name, known)}")
     if causality and variable.causality != causality:
@@ -175,6 +179,10 @@ def unmapped(file: FmuFile, causality: str, mapped: Mapping[str, str]) -> Iterat
         if variable.is_real and variable.causality == causality and variable.name not in mapped:
             paths = file.terminals.get(variable.name, ())
             yield variable, [variable.name, *(_signal_of(*path) for path in paths)]
+
+
+def _present(names: Sequence[str], known: Mapping[str, Signal]) -> list[str]:
+    return [present_name(name, known) for name in names]
 
 
 def _signal_of(*parts: str) -> str:

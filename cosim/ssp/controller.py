@@ -186,7 +186,7 @@ def _parameters(scenario: Scenario, loop: Loop) -> Iterator[Variable]:
     yield _parameter("time.control", loop.member(loop.period), _PERIOD, "Period of the law", scenario.time.control)
     initial = scenario.initial
     numbers = [*initial.position, *initial.quaternion, *initial.velocity]
-    yield from _motion("initial.", "parameter", loop, loop.inputs.start, numbers, "At the start:")
+    yield from _motion("start.", "parameter", loop, loop.inputs.start, numbers, "At the start:")
 
 
 def _accepts(law: CompiledLaw, gain: str, value: float) -> bool:

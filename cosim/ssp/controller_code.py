@@ -109,7 +109,7 @@ def _constraints(loop: Loop, regions: Sequence[Region], names: Sequence[str]) ->
     keep, (goal, packed) = loop.memory.keep, (loop.data.goal, loop.data.regions)
     if not loop.is_of_mission(loop.desired_quaternion):
         yield f'{{HOLDS_UNIT, {keep(loop.desired_quaternion)}, 4, "law.desired_quaternion is not of length 1"}}'
-    yield f'{{HOLDS_UNIT, {keep(loop.inputs.start) + 3}, 4, "initial.quaternion is not of length 1"}}'
+    yield f'{{HOLDS_UNIT, {keep(loop.inputs.start) + 3}, 4, "start.quaternion is not of length 1"}}'
     for i, (region, name) in enumerate(zip(regions, names, strict=True)):
         first = keep(packed.numbers) + int(packed.offsets[i - 1]) if i else keep(goal.numbers)
         for what, index, other, fault in constraints(region.shape.numbers()):

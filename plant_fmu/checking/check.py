@@ -13,6 +13,7 @@ from plant_fmu.checking.fmu_file import FmuFile, read_fmu
 from plant_fmu.checking.process import Importer, run_importer
 from plant_fmu.checking.task import Result, Task
 from plant_fmu.errors import TaskError
+from plant_fmu.former_names import present_name
 from plant_fmu.toml_tables import hint
 
 REFERENCE = "FMPy"  # importer with which the others are compared
@@ -44,10 +45,11 @@ def check_fmu(
     # A co-simulation that differs from FMPy's has failed. Model exchange has not: it compares the importer's integrator
     # with the one inside the FMU.
     fmu = read_fmu(path)
-    task = Task(
-        fmu.stop_time if stop_time is None else stop_time, fmu.step if step is None else step, dict(start or {})
-    )
     known = {v.name: v for v in fmu.variables if v.is_real}
+    task = Task(
+        fmu.stop_time if stop_time is None else stop_time, fmu.step if step is None else step,
+        {present_name(name, known): value for name, value in (start or {}).items()},
+    )  # fmt: skip
     for name in task.start:
         if name not in known:
             raise TaskError(f"{path}: no real variable is named {name!r}; {hint(name, known)}")

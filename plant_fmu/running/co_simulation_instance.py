@@ -15,6 +15,7 @@ from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
 from numpy.typing import NDArray
 
 from plant_fmu.errors import PlantError, StepError
+from plant_fmu.former_names import present_name
 from plant_fmu.model_variables import ModelVariable
 from plant_fmu.running.channels import DOUBLES, BoundCalls
 from plant_fmu.running.instance import Instance
@@ -92,8 +93,12 @@ class CoSimulationInstance:
         """Set parameters, inputs or start values by name."""
         self._require_open()
         batches: dict[str, tuple[list[ModelVariable], list[Value]]] = {}
-        for name, value in values.items():
-            variable = self._variable(name)
+        by_name: dict[str, Value] = {}
+        for given, value in values.items():
+            variable = self._variable(given)
+            if variable.name in by_name:
+                raise PlantError(f"{variable.name} is set twice, expected it once: by {given} too, its former name")
+            by_name[variable.name] = value
             require_settable(variable, self.initialized)
             variables, numbers = batches.setdefault(variable.type, ([], []))
             variables.append(variable)
@@ -104,12 +109,13 @@ class CoSimulationInstance:
             for variable in variables:
                 if variable.name in self._input_index:
                     self.inputs.values[self._input_index[variable.name]] = convert_value(
-                        variable, values[variable.name]
+                        variable, by_name[variable.name]
                     )
         if self.initialized:
             self._read()
 
     def __setitem__(self, name: str, value: Value) -> None:
+        name = present_name(name, self._instance.variables)
         if name in self._input_index:
             self._require_open()
             self.inputs.values[self._input_index[name]] = convert_value(self._variable(name), value)
@@ -118,6 +124,7 @@ class CoSimulationInstance:
 
     def __getitem__(self, name: str) -> Any:
         self._require_open()
+        name = present_name(name, self._instance.variables)
         if name in self._input_index:
             return float(self.inputs.values[self._input_index[name]])
         variable = self._variable(name)
@@ -132,6 +139,7 @@ class CoSimulationInstance:
 
     def _variable(self, name: str) -> ModelVariable:
         known = self._instance.variables
+        name = present_name(name, known)
         if name not in known:
             matches = difflib.get_close_matches(str(name)[:100], known, n=1)
             suggestion = (

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant_fmu.errors import PlantError
+from plant_fmu.former_names import present_name
 from plant_fmu.running.channels import DOUBLES
 from plant_fmu.running.instance import Instance
 
@@ -73,6 +74,7 @@ def stops_early(reached: float, end: float, step: float) -> bool:
 
 
 def _references(instance: Instance, names: tuple[str, ...], types: tuple[str, ...] = DOUBLES) -> NDArray[np.uint32]:
+    names = tuple(present_name(name, instance.variables) for name in names)
     for name in names:
         variable = instance.variables.get(name)
         if variable is None or variable.type not in types or variable.shape:

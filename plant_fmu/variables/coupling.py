@@ -30,7 +30,7 @@ def coupling_inputs(vehicle: Vehicle) -> Iterator[Variable]:
         ):
             for i, axis in enumerate(AXES):
                 description = what.format(frame, axis)
-                yield row(f"external.{frame}.{kind}.{axis}", f"{frame}.{kind}[{i}]", quantity, description)
+                yield row(f"load.{frame}.{kind}.{axis}", f"{frame}.{kind}[{i}]", quantity, description)
     for name, quantity, what in (
         ("normalized", q.SHARE, "Command of thruster {} as a fraction of its limits, added to its commanded force"),
         ("pulse", q.PULSE, "Command of thruster {} as a pulse of a T200, added to its commanded force; 0: none"),

@@ -99,7 +99,7 @@ _BOTTOM = ("position.z", "bottom_depth")
 _MOTION = (
     "time", "position.z", "quaternion.*", "velocity.*", "actuator.*", "thrust*", "wrench*", "mass", "inertia.*",
     "r_G.*", "r_B.*", "weight", "buoyancy", "added_mass*", "linear_damping*", "quadratic_damping*", "current*", "seed",
-    "free_surface", "hull_radius", "bottom_*", "substep", "external.*", "supply_voltage",
+    "free_surface", "hull_radius", "bottom_*", "substep", "load.*", "supply_voltage",
 )  # fmt: skip
 
 

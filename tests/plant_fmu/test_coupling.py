@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from scipy import constants
 
-from plant_fmu import load_vehicle
+from plant_fmu import Plant, PlantError, former_names, load_vehicle
 from plant_fmu.build import cached_fmu
 from plant_fmu.variables import variables
+from plant_fmu.vehicle_component import make_vehicle_component
 from tests.plant_fmu.conftest import STATES, coupled_odin
 
 MOTION = {"position.z": 2.0, "velocity.u": 0.4, "velocity.q": 0.3}
@@ -56,7 +57,7 @@ def test_zero_coupling_inputs_change_no_bit(make_slave, inputs, parameters):
 @pytest.mark.medium
 def test_inputs_act_as_parameters_do(make_slave):
     inputs = {"current_input.x": 0.2, "current_input.z": -0.1, "thrust_failure[1]": 0.25, "thrust_normalized[1]": 0.8}
-    inputs |= {"external.body.force.y": 5.0, "external.body.moment.z": -1.0, "thrust_normalized[2]": -0.5}
+    inputs |= {"load.body.force.y": 5.0, "load.body.moment.z": -1.0, "thrust_normalized[2]": -0.5}
     plain = {"thrust[1]": 0.8 * 27.0, "thrust[2]": -0.5 * 27.0, "wrench.Y": 5.0, "wrench.N": -1.0}
     parameters = {"current.x": 0.3, "current.z": -0.1, "thrust_effectiveness[1]": 0.6}
     expected = fly(make_slave(), plain, **parameters)
@@ -78,3 +79,23 @@ def test_current_rate_acts_within_a_step(make_slave):
     fine = drift(0.01, 0.5)
     assert drift(0.1, 0.5) == pytest.approx(fine, abs=1e-9)
     assert abs(drift(0.1, 0.0) - fine) > 1e-3
+
+
+def test_former_names_are_read_with_a_line(caplog):
+    """The names of loads once began with a word that Modelica reserves."""
+    former_names._log_former_name.cache_clear()
+    component = make_vehicle_component(load_vehicle("odin"), start={"external.world.force.x": 3.0}, coupled=True)
+    assert [v.start for v in component.variables if v.name == "load.world.force.x"] == [3.0]
+    with Plant(cached_fmu(coupled_odin(), 3)) as plant:
+        plant.set({"external.body.force.y": 4.0})
+        plant.initialize()
+        plant["external.body.force.y"] = 5.0
+        assert plant["load.body.force.y"] == plant["external.body.force.y"] == 5.0
+        plant.step(0.01)
+        assert plant["velocity.v"] > 0.0
+        with pytest.raises(PlantError, match=r"load.world.force.x is set twice, expected it once: .*external.world"):
+            plant.set({"load.world.force.x": 1.0, "external.world.force.x": 2.0})
+    assert [record.message for record in caplog.records] == [
+        "variable external.world.force.x is now load.world.force.x",
+        "variable external.body.force.y is now load.body.force.y",
+    ]

@@ -87,9 +87,9 @@ def external_wrench(v, R):
     """Wrench of the coupling inputs in body axes; 0 for a plant that has none."""
     total = np.zeros(6)
     for frame, to_body in (("world", R.T), ("body", np.eye(3))):
-        if f"external.{frame}.force.x" in v:
-            force, moment = (to_body @ vector(v, f"external.{frame}.{kind}") for kind in ("force", "moment"))
-            total = total + np.r_[force, moment + np.cross(vector(v, f"external.{frame}.point"), force)]
+        if f"load.{frame}.force.x" in v:
+            force, moment = (to_body @ vector(v, f"load.{frame}.{kind}") for kind in ("force", "moment"))
+            total = total + np.r_[force, moment + np.cross(vector(v, f"load.{frame}.point"), force)]
     return total
 
 

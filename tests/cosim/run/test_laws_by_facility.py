@@ -168,10 +168,10 @@ def test_coupled_plant_without_its_inputs_is_the_plant_bit_for_bit(fmi, order, t
 @pytest.mark.medium
 def test_further_inputs_of_a_coupled_plant_are_the_callers_and_recorded():
     with Master(SCENARIO, FunctionLaw(lambda *_: np.zeros(6)), coupled(3)) as master:
-        master.plant["external.body.force.x"] = 100.0
+        master.plant["load.body.force.x"] = 100.0
         rows = []
         master.run([SimpleNamespace(observe=lambda k, row: rows.append(row.copy()))])
-        force, speed = (master.signals.index(name) for name in ("external.body.force.x", "velocity.u"))
+        force, speed = (master.signals.index(name) for name in ("load.body.force.x", "velocity.u"))
     assert all(row[force] == 100.0 for row in rows)
     assert rows[-1][speed] > 0.01
 

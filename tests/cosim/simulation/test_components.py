@@ -23,7 +23,7 @@ from tests.cosim.simulation.keep import kept_rows
 from tests.foreign_fmu import MODES, build_foreign_fmu
 
 TIMES = ["time.duration=3", "time.step=0.01", "time.control=0.01", "time.arbiter=0.01", "arbiter.engine=closed"]
-POSITION, FORCE = ([f"{name}.{axis}" for axis in "xyz"] for name in ("position", "external.world.force"))
+POSITION, FORCE = ([f"{name}.{axis}" for axis in "xyz"] for name in ("position", "load.world.force"))
 CURRENT = ["current_input.x", "current_input.y"]
 UNITS = dict.fromkeys(POSITION, "m") | dict.fromkeys(FORCE, "N") | dict.fromkeys(CURRENT, "m/s")
 
@@ -147,13 +147,13 @@ def test_master_equals_an_independent_one(fmus, fmi, order, tmp_path):
         wrenches = np.vstack([np.zeros(6), wrenches[:-1]])
     expected = in_fmpy(scenario, fmus, wrenches, order, tmp_path)
     np.testing.assert_allclose(np.column_stack([run[name] for name in POSITION]), expected, rtol=0.0, atol=1e-9)
-    assert np.abs(run["external.world.force.x"]).max() > 10.0 and np.ptp(run["current_input.x"]) > 0.1
+    assert np.abs(run["load.world.force.x"]).max() > 10.0 and np.ptp(run["current_input.x"]) > 0.1
 
 
 def test_outputs_are_columns_of_the_beginning_of_a_step(fmus, fmi):
     run = kept_rows(beside(fmus, fmi, "tether", "current"))
     columns = {column.name: column for column in run.signals.columns}
-    assert columns["tether.external.world.force.z"].unit == "N" and columns["current.current_input.x"].unit == "m/s"
+    assert columns["tether.load.world.force.z"].unit == "N" and columns["current.current_input.x"].unit == "m/s"
     for name in FORCE:  # what a step applies is given at its end (Gauss-Seidel)
         np.testing.assert_array_equal(run[name][:-2], run[f"tether.{name}"][1:-1], name)
 
@@ -164,6 +164,21 @@ def test_map_connects_other_names(fmus, fmi):
     one, other = kept_rows(beside(fmus, fmi, "tether")), kept_rows(beside(fmus, fmi, "line", line=maps))
     for name in (*POSITION, *FORCE):
         np.testing.assert_array_equal(one[name], other[name], name)
+
+
+def test_former_names_of_loads_are_read(fmus, tmp_path, caplog):
+    """In a map, as the name of an output without a map, of a column, and of the plant's input; with one line."""
+    former = [name.replace("load", "external") for name in FORCE]
+    maps = {"inputs": dict(zip(short(POSITION), POSITION, strict=True))}
+    maps["outputs"] = dict(zip(short(FORCE), former, strict=True))
+    one, other = kept_rows(beside(fmus, 3, "tether")), kept_rows(beside(fmus, 3, "line", line=maps))
+    build_fmu(tmp_path, 3, "tether", inputs=numbered(POSITION, 10), outputs=numbered(former, 20))
+    unmapped = kept_rows(beside(tmp_path, 3, "tether"))
+    for name, old in zip(FORCE, former, strict=True):
+        np.testing.assert_array_equal(one[name], other[name], name)
+        np.testing.assert_array_equal(one[name], unmapped[name], name)
+        assert [r.message for r in caplog.records].count(f"variable {old} is now {name}") <= 1
+    assert any("is now" in record.message for record in caplog.records)
 
 
 @pytest.mark.parametrize("by", ["inputs", "outputs"])
@@ -225,7 +240,7 @@ def test_reset_by_commands_and_steps_one_by_one(fmus):
     ("mode", "words"),
     [
         ("error", "t = 1 s: "), ("fatal", "t = 1 s: out of memory"), ("discard", "t = 1.005 s: the FMU discarded"),
-        ("nan", "t = 1 s: external.world.force.x is nan, expected a finite number"),
+        ("nan", "t = 1 s: load.world.force.x is nan, expected a finite number"),
     ],
 )  # fmt: skip
 def test_failures_name_fmu_and_time_and_keep_the_record(fmus, fmi, tmp_path, mode, words):
@@ -247,7 +262,7 @@ def test_failures_name_fmu_and_time_and_keep_the_record(fmus, fmi, tmp_path, mod
         (["gain:a", "gain:b"], {"a": {"inputs": {"u": "b.y"}}, "b": {"inputs": {"u": "a.y"}}},
          r"components: (a -> b -> a|b -> a -> b) is a cycle .* --set master.order=jacobi"),
         (["gain:a"], {"a": {"inputs": {"u": "a.y"}}}, "components: a -> a is a cycle"),
-        (["tether", "tether:two"], {}, "components.two.outputs.external.world.force.x is .* which another output sets"),
+        (["tether", "tether:two"], {}, "components.two.outputs.load.world.force.x is .* which another output sets"),
         (["gain:a"], {"a": {"inputs": {"v": "position.x"}}}, "components.a.inputs.v: gain3.fmu has no variable"),
         (["gain:a"], {"a": {"inputs": {"u": "positoin.x"}}}, "is no signal; did you mean 'position.x'"),
         (["gain:a"], {"a": {"inputs": {"y": "position.x"}}}, "y of gain3.fmu is of causality output, expected input"),

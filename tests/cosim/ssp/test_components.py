@@ -19,10 +19,11 @@ from cosim.ssp.loop import Loop
 from cosim.ssp.system import MOTION, WRENCH
 from examples.laws.sliding_mode import SlidingModeLaw
 from fuzzy_arbiter import Arbiter
-from plant_fmu import PlantError
+from plant_fmu import PlantError, load_vehicle
 from plant_fmu.build import cached_fmu
 from plant_fmu.checking.check import check_fmu
 from plant_fmu.running.co_simulation_instance import CoSimulationInstance
+from plant_fmu.vehicle_component import make_vehicle_component
 from tests.cosim.ssp.jacobi import Parts
 from tests.cosim.ssp.noise import Noise
 from tests.plant_fmu.importers import installed
@@ -139,7 +140,7 @@ def test_numbers_of_the_scenario_are_parameters(controller):
     controller.set({
         "law.gains.k_p1": 30.0, "law.gains.gamma": 1.0, "arbiter.ramp": 0.3, "regions.ball.gain": 77.0,
         "regions.ball.shape.radius": 0.9, "regions.line.shape.radius": 0.5,
-        "initial.position.x": 1.0, "initial.position.y": 1.0, "initial.position.z": 2.0,
+        "start.position.x": 1.0, "start.position.y": 1.0, "start.position.z": 2.0,
         "goal.velocity.x": 0.4, "regions.ball.velocity.x": 0.5,
     })  # fmt: skip
     controller.initialize()
@@ -212,7 +213,7 @@ def test_no_array_is_both_a_variable_and_a_constant(law):
         ({"regions.wreck.shape.top": 4.0}, "regions.wreck: bottom is not above top"),
         ({"regions.view.shape.sine": 0.9}, "regions.view: sine and cosine are of no angle"),
         ({"law.desired_quaternion.e0": 0.0}, "law.desired_quaternion is not of length 1"),
-        ({"initial.quaternion.e0": 0.0}, "initial.quaternion is not of length 1"),
+        ({"start.quaternion.e0": 0.0}, "start.quaternion is not of length 1"),
     ],
 )
 def test_invalid_shape_parameters_are_rejected(controller, values, said):
@@ -373,3 +374,30 @@ def test_every_importer_accepts_the_components(scenario, fmi, make):
     for result in results:
         assert result.status != "failed", (result.importer, result.note)
     assert sum(result.status == "ok" for result in results) >= 3
+
+
+# Modelica 3.6, section 2.3.3
+KEYWORDS = re.findall(
+    r"\w+",
+    """algorithm and annotation block break class connect connector constant constrainedby der discrete each else elseif
+    elsewhen encapsulated end enumeration equation expandable extends external false final flow for function if import
+    impure in initial inner input loop model not operator or outer output package parameter partial protected public
+    pure record redeclare replaceable return stream then true type when while within""",
+)
+
+
+@pytest.mark.parametrize("name", ["paper", "docking", "depth-transit"])
+def test_no_name_has_a_keyword_of_modelica(name):
+    scenario, vehicle = load_scenario(name), load_vehicle("odin")
+    plants = [make_vehicle_component(vehicle, coupled=True, arrays=arrays) for arrays in (False, True)]
+    names = [
+        v.name for c in (*plants, controller_component(scenario), arbiter_component(scenario)) for v in c.variables
+    ]
+    parts = {part for name in names for part in re.split(r"[^\w]+", name.removeprefix("der"))}
+    assert not parts.intersection(KEYWORDS)
+
+
+def test_former_names_of_the_start_are_read(controller):
+    controller.set({"initial.position.x": 0.25})
+    controller.initialize()
+    assert controller["start.position.x"] == 0.25
