@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -164,6 +165,7 @@ class Companion:
         self.placement = ""
         self._placed_by: tuple[Array | None, bool, frozenset[int]] = (None, False, frozenset())
         self._scene = Placement(self.scenario)
+        self._ranged, self._nearer_since = 0, math.inf  # processed DISTANCE_SENSOR messages; our time [s]
         self.session.dive.clearance = self._clearance
 
     def run(
@@ -289,14 +291,25 @@ class Companion:
             on_state(*state)
         self._reported = state
 
+    def _watch_ranges(self, position: Array) -> None:
+        """Note for how long ranges have been shorter than the scene's, at a position [m, NED] in it."""
+        session, reported = self.session, self.session.reported
+        if self._ranged == reported.message_counts["DISTANCE_SENSOR"]:
+            return
+        now, self._ranged = session.clock(), reported.message_counts["DISTANCE_SENSOR"]
+        is_nearer = self._scene.is_nearer(position, reported.quaternion, reported.ranges)
+        self._nearer_since = min(self._nearer_since, now) if is_nearer else math.inf
+        session.nearer_time = max(0.0, now - self._nearer_since)
+
     def _update_placement(self) -> None:
         """Describe where the vehicle is once its frame is known; let it be armed and steered near the scene alone."""
         session, offset = self.session, self.session.alignment.offset
-        if session.supervisor.is_steering and session.is_placed:
-            return
         position = session.alignment.to_scene(session.reported.position)
         if not np.isfinite(position).all():
             session.is_placed, self._placed_by = False, (None, False, frozenset())
+            return
+        self._watch_ranges(position)
+        if session.supervisor.is_steering and session.is_placed:
             return
         distance = self._scene.distance(position)
         is_near = distance <= MAX_DISTANCE

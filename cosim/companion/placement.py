@@ -51,14 +51,26 @@ class Placement:
 
     def contradictions(self, position: Array, quaternion: Array, ranges: Mapping[int, float]) -> dict[int, str]:
         """Describe ranges [m], by MAV_SENSOR_ROTATION, that differ from those to the hard regions of the scene."""
-        R, differing = rotation_matrix(quaternion), dict[int, str]()
-        for rotation in ranges.keys() & _BEAMS:
-            (word, beam), measured = _BEAMS[rotation], ranges[rotation]
-            expected = self._range(position, quaternion, R @ beam)
-            is_expected = -_RANGE_TOLERANCE <= measured - expected <= _RANGE_TOLERANCE + _INSET
-            if not is_expected and expected < _MAX_RANGE:
-                differing[rotation] = f"{word} {expected:.2f} m are free, but {measured:.2f} m by the distance sensor"
+        differing = dict[int, str]()
+        for rotation, excess in self._excesses(position, quaternion, ranges).items():
+            if not -_RANGE_TOLERANCE <= excess <= _RANGE_TOLERANCE + _INSET:
+                word, measured = _BEAMS[rotation][0], ranges[rotation]
+                free = f"{word} {measured - excess:.2f} m are free"
+                differing[rotation] = f"{free}, but {measured:.2f} m by the distance sensor"
         return differing
+
+    def is_nearer(self, position: Array, quaternion: Array, ranges: Mapping[int, float]) -> bool:
+        """Return True if a range, as for `contradictions`, is shorter than the way to the hard regions of the scene."""
+        return min(self._excesses(position, quaternion, ranges).values(), default=0.0) < -_RANGE_TOLERANCE
+
+    def _excesses(self, position: Array, quaternion: Array, ranges: Mapping[int, float]) -> dict[int, float]:
+        """Return by how much ranges exceed the scene's [m], where that has a hard region within 50 m."""
+        R, excesses = rotation_matrix(quaternion), dict[int, float]()
+        for rotation in ranges.keys() & _BEAMS:
+            expected = self._range(position, quaternion, R @ _BEAMS[rotation][1])
+            if expected < _MAX_RANGE:
+                excesses[rotation] = ranges[rotation] - expected
+        return excesses
 
     def _range(self, position: Array, quaternion: Array, direction: Array) -> float:
         """Return the distance [m] to the first hard region in a direction, a unit vector; at least 50 m for none."""

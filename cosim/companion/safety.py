@@ -47,6 +47,13 @@ CONDITIONS: tuple[Condition, ...] = (
     Condition("geofence", 0.1, "m", "depth of the violation of a hard region", "held"),
     Condition("battery", 0.0, "", "the remaining charge is below the user's limit", "held"),
     Condition("leak", 0.0, "", "the autopilot has reported a leak", "held"),
+    Condition(
+        "unexpected range",
+        1.0,
+        "s",
+        "since a distance sensor shows something over 0.5 m nearer than the scene's hard regions",
+        "held",
+    ),
 )
 
 

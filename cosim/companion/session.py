@@ -55,6 +55,7 @@ class AutopilotSession:
         self.failsafes = Failsafes(options.profile)
         self.supervisor = Supervisor(options.dry_run)
         self.lateness = self.outside = 0.0  # s; m
+        self.nearer_time = 0.0  # s, since a distance sensor shows something nearer than the scene
         self.is_placed, self.misplaced = False, ""
         self.commands = CommandQueue(("hold", "reach"))  # from page and terminal: end steering, and resume it
         self._taken_over = self._was_in_mode = self._is_ending = False
@@ -196,6 +197,7 @@ class AutopilotSession:
             "unfinished dive": self.dive.time_diving(now),
             "battery": float(reported.battery < self._options.least_battery),
             "leak": float(reported.is_leaking),
+            "unexpected range": self.nearer_time,
             "takeover": float(self._taken_over),
         }
         if self._dive_mode == "hold" and self.supervisor.state == "diving" and self.dive.is_stuck(reported, now):

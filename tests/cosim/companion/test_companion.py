@@ -453,6 +453,21 @@ def test_violated_hard_region_holds_the_vehicle(tmp_path):
     assert inside == (flight.status == "held: geofence")
 
 
+@pytest.mark.medium
+@pytest.mark.parametrize("echoes", [1, 100])
+def test_a_bottom_nearer_than_the_scene_says_holds_the_vehicle_unless_it_is_one_echo(tmp_path, echoes):
+    """The scene's frame is off, or something is there that the scene has not."""
+    link, left = StandIn(profile="generic", shift=SHIFT, overrides=["plant.parameters.bottom_depth=4.9"]), [echoes]
+
+    def nearer(message):
+        message.current_distance -= 100 if left[0] > 0 else 0
+        left[0] -= 1
+
+    flight = Flight(tmp_path, 6.0, link=link, events=[lambda: link.tamper.update(DISTANCE_SENSOR=nearer)])
+    assert flight.status == ("completed" if echoes == 1 else "held: unexpected range")
+    assert echoes == 1 or flight.time_of("held") < EVENT + 3.0  # at 2 Hz
+
+
 PILOTS = {
     "mode taken": lambda link: command(link, 176, 1.0, 4.0, 3.0),
     "pilot's sticks": lambda link: link.hear(mavlink.MAVLink_manual_control_message(1, 600, 0, 0, 0, 0)),
@@ -587,7 +602,7 @@ def test_a_command_to_resume_does_not_undo_the_release_at_the_end(tmp_path, link
 
 
 def test_every_condition_has_a_test():
-    tested = {*FAULTS, *PILOTS, "refused mode", "frame drift", "geofence", "unfinished dive"}
+    tested = {*FAULTS, *PILOTS, "refused mode", "frame drift", "geofence", "unfinished dive", "unexpected range"}
     assert tested == {condition.name for condition in CONDITIONS}
 
 
