@@ -20,11 +20,15 @@ _READ_EVERY = 0.004  # s, period of reading the autopilot's port
 
 
 class SimulatedLink:
-    """The companion's link in the plant's time: waiting for a message advances plant and autopilot."""
+    """The companion's link in the plant's time: waiting for a message advances plant and autopilot.
+
+    Messages are exchanged while the autopilot waits for the plant, so that a flight is the same each time.
+    """
 
     def __init__(self, flights: SitlSession, server: JsonServer, endpoint: str) -> None:
         self._flights, self._server = flights, server
-        self._link = GroundLink(parse_endpoint(endpoint), identity=COMPANION)
+        server.before_answer = self._exchange
+        self._link = GroundLink(parse_endpoint(endpoint), identity=COMPANION, clock=self.clock)
         self.name, self.identity = endpoint, COMPANION
         self.cut = False  # True: all messages in both directions are lost
         self.lost = set[str]()  # names of messages that are lost in both directions
@@ -64,6 +68,8 @@ class SimulatedLink:
         """Answer one frame of the autopilot."""
         if status := self._server.poll():
             raise RunError(f"the autopilot's run: {status}")
+
+    def _exchange(self) -> None:
         now = self.clock()
         while self.events and self.events[0][0] <= now:
             self.events.pop(0)[1]()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
+import math
 import socket
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from cosim.sitl import json_protocol
@@ -16,6 +18,7 @@ log = logging.getLogger(__name__)
 Sender = tuple[str, int]
 
 _SENDER_TIMEOUT = 1.0  # s of the wall clock without frames, after which another sender is accepted
+_RESEND_PERIOD = 0.5  # s of the wall clock, below an autopilot's least time from a frame to its repetition
 _WARNING_PERIOD = 10.0  # s of the wall clock, between two warnings of one kind
 
 
@@ -25,9 +28,11 @@ class JsonServer(LockstepServer):
 
     kind = socket.SOCK_DGRAM
     # frames that the autopilot has counted, one more with each answer that it has received; None before the first
+    before_answer: Callable[[], None] = lambda: None  # called while the autopilot waits for its answer
     _count: int | None = field(default=None, init=False)
     _sender: Sender | None = field(default=None, init=False)
     _answer: bytes = field(default=b"", init=False)
+    _answered: float = field(default=-math.inf, init=False)  # s of the wall clock
     _warned: dict[str, float] = field(default_factory=dict, init=False)  # s, time of the last warning of each kind
 
     def _serve(self) -> str:
@@ -62,12 +67,16 @@ class JsonServer(LockstepServer):
         last, self._count = self._count, packet.frame_count
         if packet.frame_count == last:
             self.counts.resent += 1
+            if now - self._answered < _RESEND_PERIOD:  # it was on its way as the answer was sent
+                return True
         else:
             if last is None or packet.frame_count < last:
                 self._begin(packet.frame_rate)
             elif packet.frame_count > last + 1:
                 self._count_lost(packet.frame_count - last - 1)
             self._step(packet)
+            self.before_answer()
+        self._answered = time.monotonic()
         try:
             self._socket.sendto(self._answer, sender)
         except OSError as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections import deque
 from dataclasses import dataclass
 from typing import Any
@@ -31,7 +30,7 @@ ESTIMATE = (
 
 _RATES = {"HEARTBEAT": 5.0, "ATTITUDE_QUATERNION": 50.0, "LOCAL_POSITION_NED": 50.0}  # Hz
 _RECEIVE_PERIOD = 0.005  # s of simulated time between two readings of the link
-_REQUEST_PERIOD, _HEARTBEAT_PERIOD = 10.0, 1.0  # s of the link's clock
+_REQUEST_PERIOD, _HEARTBEAT_PERIOD = 10.0, 1.0  # s of simulated time
 _MICRO = 1e6
 
 
@@ -81,7 +80,8 @@ class SitlLink:
     def __init__(self, endpoint: Endpoint, dvl: DvlOptions | None = None) -> None:
         if endpoint.kind == "tlog":
             raise TelemetryError(f"endpoint {endpoint.text!r}: expected a network or a serial device, not a file")
-        self._link, self._mavlink = GroundLink(endpoint, identity=IDENTITY), dialect()
+        self._time = 0.0  # s, simulated: the load of the machine changes neither connections nor requests
+        self._link, self._mavlink = GroundLink(endpoint, identity=IDENTITY, clock=lambda: self._time), dialect()
         self._reported = ReportedState()
         self._dvl = None if dvl is None else Dvl(dvl)
         self.estimate: Array = np.full(len(ESTIMATE), math.nan)
@@ -104,8 +104,10 @@ class SitlLink:
                 self._link.send(m.MAVLink_vision_position_delta_message(stamp, interval, rotation, displacement, 100.0))
         if 0.0 <= motion.time - self._received_at < _RECEIVE_PERIOD:
             return
-        self._received_at = motion.time
-        now, reported = time.monotonic(), self._reported
+        if motion.time < self._received_at:  # the autopilot has restarted
+            self._requested_at = self._heartbeat_at = -math.inf
+        self._received_at = self._time = now = motion.time
+        reported = self._reported
         for received in self._link.receive(0.0):
             reported.receive(received.system, received.component, received.message, now)
         self._request_streams(now)

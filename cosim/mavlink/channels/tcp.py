@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 import errno
 import logging
+import math
 import socket
-import time
 from collections.abc import Hashable
 
 from cosim.errors import TelemetryError
@@ -95,7 +95,7 @@ class TcpOut(SinglePeer):
     def __init__(self, host: str, port: int) -> None:
         self._address = (host, port)
         self._attempt: socket.socket | None = None
-        self._attempted_at = time.monotonic()
+        self._attempted_at = -math.inf
         stream = None
         with contextlib.suppress(OSError):
             stream = make_stream(socket.create_connection((host, port), _CONNECT_TIMEOUT))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Any, NamedTuple, Self
 
 from cosim.mavlink.wire.dialect import dialect, make_heartbeat
@@ -22,7 +23,7 @@ GROUND_STATION: Identity = (255, 190)  # QGroundControl's system and component
 class ReceivedMessage(NamedTuple):
     """A received message with its time and sender."""
 
-    time: float  # s, time.monotonic()
+    time: float  # s, of the link's clock
     system: int
     component: int
     sequence: int
@@ -33,13 +34,19 @@ class ReceivedMessage(NamedTuple):
 class GroundLink:
     """A ground station's end of an endpoint."""
 
-    def __init__(self, endpoint: Endpoint, key: bytes | None = None, identity: Identity = GROUND_STATION) -> None:
-        self.name, self.identity = endpoint.text, identity
+    def __init__(
+        self,
+        endpoint: Endpoint,
+        key: bytes | None = None,
+        identity: Identity = GROUND_STATION,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.name, self.identity, self._clock = endpoint.text, identity, clock  # s, for connections and messages
         self.stats = RxStats()
-        clock = SigningClock(None if key is None else timestamp_file(key, identity))
-        frames = FrameFilter(self.stats, verifier=None if key is None else Verifier(key, clock))
+        stamps = SigningClock(None if key is None else timestamp_file(key, identity))
+        frames = FrameFilter(self.stats, verifier=None if key is None else Verifier(key, stamps))
         self.channel, _ = open_channel(endpoint)
-        signer = None if key is None else Signer(key, clock, link=0)
+        signer = None if key is None else Signer(key, stamps, link=0)
         self._link = Link(endpoint.text, self.channel, frames, identity, signer=signer)
         self.sends_first = endpoint.kind in ("udpout", "tcp", "serial")  # else the vehicle may not know this address
         m = dialect()
@@ -50,11 +57,11 @@ class GroundLink:
         deadline = time.monotonic() + timeout
         while True:
             now = time.monotonic()
-            self.channel.poll(now)
+            self.channel.poll(self._clock())
             received: list[ReceivedMessage] = []
             for _, message in self._link.receive(time.perf_counter() + _MAX_READ_TIME):
                 source = message.get_srcSystem(), message.get_srcComponent(), message.get_seq()
-                received.append(ReceivedMessage(time.monotonic(), *source, message.get_type(), message))
+                received.append(ReceivedMessage(self._clock(), *source, message.get_type(), message))
                 if len(received) == _MAX_MESSAGES:
                     break
             if received or now >= deadline:

@@ -1,6 +1,7 @@
 """Lockstep with a stand-in for ArduPilot: exact, repeated, lost and foreign frames; restarts; and records."""
 
 import random
+import select
 import time
 from importlib import resources
 
@@ -9,7 +10,7 @@ import pytest
 
 from cosim.results.record import load_record
 from cosim.simulation.master import Master
-from cosim.sitl import motion
+from cosim.sitl import json_server, motion
 from cosim.sitl.law import make_pwm_law
 from cosim.sitl.sitl_session import RESTARTED, FlightOptions, SitlSession, scenario_to_fly
 from plant_fmu import load_vehicle
@@ -131,17 +132,32 @@ def test_run_equals_a_master_with_the_autopilot_as_law(serve):
     assert record["weight.depth"].any()
 
 
-def test_a_resent_frame_gets_the_same_answer_and_makes_no_step(serve):
+def test_a_resent_frame_gets_the_same_answer_and_makes_no_step(serve, monkeypatch):
+    """One that comes at once was on its way as the answer was sent: a second answer would be taken for the next one."""
+    monkeypatch.setattr(json_server, "_RESEND_PERIOD", 0.0)
     served = serve("time.duration=0.1")
     with StandIn(served.address) as pilot:
         first = pilot.exchange(NEUTRAL)
         for pwm in (NEUTRAL, heave(1.0), heave(-1.0)):  # whatever its pulses are now
             assert pilot.exchange(pwm, count=0) == first
+        monkeypatch.setattr(json_server, "_RESEND_PERIOD", 60.0)
+        pilot.send(frame(0, NEUTRAL, pilot.rate, pilot.channels))
         for _ in range(119):
             last = pilot.exchange(NEUTRAL)
     outcome = served.outcome()
     assert parse(newest_line(last))["timestamp"] == 120 * DT
-    assert (outcome.counts.steps, outcome.counts.resent) == (120, 3)
+    assert (outcome.counts.steps, outcome.counts.resent) == (120, 4)
+
+
+def test_what_is_called_before_the_answer_finds_the_autopilot_waiting(serve):
+    """So what it sends comes at the same frame, however loaded the machine is."""
+    served, waiting = serve("time.duration=0.1"), []
+    with StandIn(served.address) as pilot:
+        served.server.before_answer = lambda: waiting.append(not select.select([pilot.socket], [], [], 0.0)[0])
+        for _ in range(120):
+            pilot.exchange(NEUTRAL)
+    served.outcome()
+    assert waiting == [True] * 120
 
 
 def test_lost_frames_are_counted_and_advance_one_step(serve, caplog):
