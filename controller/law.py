@@ -64,6 +64,7 @@ class VehicleModel(NamedTuple):
     thrust_min: Array  # (m,) N, minimum force of each thruster, 0 or negative
     thrust_max: Array  # (m,) N, maximum force of each thruster
     thrust_time_constant: Array  # (m,) s, time constant of each thruster's lag
+    trim: Vector6  # N, N m: constant wrench on the body
     righting_moment: float = 0.0  # N m, z_G W - z_B B, where a law must leave an axis to it, or may have to
 
 

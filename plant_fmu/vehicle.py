@@ -23,6 +23,7 @@ Number = Annotated[float, Meta(ge=-MAX_NUMBER, le=MAX_NUMBER)]
 Amount = Annotated[float, Meta(ge=0.0, le=MAX_NUMBER)]
 Fraction = Annotated[float, Meta(ge=0.0, le=1.0)]
 Vector3 = tuple[Number, Number, Number]
+Wrench = tuple[Number, Number, Number, Number, Number, Number]  # X Y Z K M N
 Damping = tuple[Amount, Amount, Amount, Amount, Amount, Amount]  # of u v w p q r (Property 3)
 Rows = tuple[tuple[Number, ...], ...]
 Matrix = tuple[Number | tuple[Number, ...], ...]  # rows, or a diagonal
@@ -43,6 +44,7 @@ _KEYS = {
     "weight": "rigid_body.weight",
     "r_B": "hydrostatics.center_of_buoyancy",
     "buoyancy": "hydrostatics.buoyancy",
+    "trim": "hydrostatics.trim",
     "added_mass": "hydrodynamics.added_mass",
     "linear_damping": "hydrodynamics.linear_damping",
     "quadratic_damping": "hydrodynamics.quadratic_damping",
@@ -74,10 +76,11 @@ class RigidBody(Table, frozen=True):
 
 
 class Hydrostatics(Table, frozen=True):
-    """Buoyancy and its center."""
+    """Buoyancy, its center, and a constant wrench."""
 
     buoyancy: Annotated[float, key("buoyancy of the submerged vehicle", "N", ge=0.0, le=MAX_NUMBER)]
     center_of_buoyancy: Vector3  # m, body frame
+    trim: Wrench = (0.0,) * 6  # N, N m: constant wrench on the body, as of a mounted tether
 
 
 class Hydrodynamics(Table, frozen=True):
@@ -150,6 +153,7 @@ class Vehicle:
     r_B: NDArray[np.float64]  # (3,) m, body frame: center of buoyancy
     weight: float  # N
     buoyancy: float  # N
+    trim: NDArray[np.float64]  # (6,) N, N m: constant wrench on the body
     added_mass: NDArray[np.float64]  # (6, 6) kg, kg m, kg m2
     linear_damping: NDArray[np.float64]  # (6,) N s/m, N m s/rad
     quadratic_damping: NDArray[np.float64]  # (6,) N s2/m2, N m s2/rad2

@@ -38,7 +38,7 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     flag(
         verb, "--nuisance NAME", "nuisance parameters: current, force, delay, lever, bias, scale, asymmetry, phase, "
-        "random_force, trim (default: current, lever, bias, scale and phase); or auto: those that predict best what "
+        "random_force (default: current, lever, bias, scale and phase); or auto: those that predict best what "
         "was not fitted, with measured attitude", nargs="*",
     )  # fmt: skip
     flag(verb, "--measured-attitude", "take attitude and turn rates as inputs, and identify translation alone")

@@ -29,8 +29,9 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
     parameters = fitted.parameters
     kinds = {p.kind for p in parameters}
     groups = {f"--nuisance {name}": nuisances((name,), logs) for name in NUISANCES if name not in kinds}
-    for kind, key in (("thrust", "thrusters.matrix"), ("lag", "thrusters.time_constant")):
-        if kind not in kinds:
+    free_keys = {".".join(p.name.split(".")[:2]) for p in parameters}
+    for key in ("thrusters.matrix", "thrusters.time_constant", "hydrostatics.trim"):
+        if key not in free_keys:
             groups[f"--free {key}"] = free_parameters(vehicle, (key,))
     every = [*parameters, *(p for group in groups.values() for p in group)]
     extended = np.concatenate([values, [p.start for p in every[len(values) :]]])

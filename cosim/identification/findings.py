@@ -178,9 +178,9 @@ def _nuisance_flag(fit: Fit, *more: str) -> str:
 _CAUSES = {
     "delay": "late samples", "scale": "the DVL's scale", "force": "a constant force, as of a tether",
     "asymmetry": "thrusters that are weaker backward", "thrusters.matrix": "unequal thrusters",
+    "hydrostatics.trim": "a constant force on the body, as of a mounted tether",
     "thrusters.time_constant": "a lag of the thrusters", "current": "a current", "lever": "the DVL's lever arm",
     "bias": "biases of the gyro", "phase": "commands that change early or late between samples",
-    "trim": "a constant force on the body, as of trim or a mounted tether",
     "random_force": "a force that changes in time, such as of waves or a tether",
 }  # fmt: skip
 

@@ -17,9 +17,7 @@ from cosim.identification.measurements import Errors
 from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
 
-Kind = Literal[
-    "plant", "lag", "thrust", "current", "force", "delay", "lever", "bias", "scale", "asymmetry", "phase", "trim"
-]
+Kind = Literal["plant", "lag", "thrust", "current", "force", "delay", "lever", "bias", "scale", "asymmetry", "phase"]
 
 # what is freed unless the user says otherwise: mass, weight, center of gravity and inertia are known better by scales
 DEFAULT_FREE = (
@@ -32,7 +30,7 @@ TRANSLATION_FREE = (
     *(f"hydrodynamics.{kind}_damping.{i}" for kind in ("linear", "quadratic") for i in (1, 2, 3)),
     "hydrostatics.buoyancy",
 )  # fmt: skip
-NUISANCES: tuple[Kind, ...] = ("current", "force", "delay", "lever", "bias", "scale", "asymmetry", "phase", "trim")
+NUISANCES: tuple[Kind, ...] = ("current", "force", "delay", "lever", "bias", "scale", "asymmetry", "phase")
 RANDOM_FORCE = "random_force"  # a nuisance that is eliminated from each window, and no parameter
 DEFAULT_NUISANCES = ("current", "lever", "bias", "scale", "phase")
 
@@ -44,11 +42,12 @@ _DAMPING_UNITS = {"linear_damping": ("N s/m", "N m s/rad"), "quadratic_damping":
 _FORCES = {"mass": ("kg", 0.02), "weight": ("N", 0.02), "buoyancy": ("N", 0.05)}  # unit, relative deviation
 _INERTIA = 0.2  # relative deviation
 _CENTER = 0.03  # m
+_TRIM = (3.0, 0.5)  # N, N m
 _LAG, _MAX_LAG = 0.2, 2.0  # s
 _THRUST = 0.1  # relative deviation of each thruster: 3.5 % of all eight together
 _KEYS = (
     "rigid_body.mass", "rigid_body.weight", "rigid_body.inertia", "rigid_body.center_of_gravity",
-    "hydrostatics.buoyancy", "hydrostatics.center_of_buoyancy", "hydrodynamics.added_mass",
+    "hydrostatics.buoyancy", "hydrostatics.center_of_buoyancy", "hydrostatics.trim", "hydrodynamics.added_mass",
     "hydrodynamics.linear_damping", "hydrodynamics.quadratic_damping", "thrusters.time_constant", "thrusters.matrix",
 )  # fmt: skip
 _NUISANCES: dict[str, tuple[str, str, float, str]] = {  # label, unit, deviation of the prior, axes
@@ -60,7 +59,6 @@ _NUISANCES: dict[str, tuple[str, str, float, str]] = {  # label, unit, deviation
     "scale": ("DVL scale error", "", 0.01, " "),
     "asymmetry": ("loss backward of thruster", "", 0.1, ""),
     "phase": ("changes between samples:", "", 1.0, ""),
-    "trim": ("trim", "N", 3.0, "XYZKMN"),
 }
 _CHANGE_PRIORS = {  # unit and deviation of the prior: those of a step at a time uniform in a period
     "lateness": ("periods", 0.29), "spread": ("periods2", 0.037), "smoothness": ("periods2/12", 1.0),
@@ -112,6 +110,8 @@ def free_parameters(vehicle: Vehicle, keys: Sequence[str]) -> list[Parameter]:
 
 def nuisances(names: Sequence[str], logs: Sequence[Log], common_delay: bool = False) -> list[Parameter]:
     """Return the free parameters that are not of the vehicle; with `common_delay` one delay of all topics."""
+    if "trim" in names:
+        raise IdentificationError("--nuisance trim: is a vehicle's number, expected --free hydrostatics.trim")
     if unknown := [name for name in names if name not in (*NUISANCES, RANDOM_FORCE)]:
         expected = ", ".join((*NUISANCES, RANDOM_FORCE))
         raise IdentificationError(f"--nuisance {unknown[0]}: is unknown, expected some of {expected}")
@@ -129,8 +129,6 @@ def nuisances(names: Sequence[str], logs: Sequence[Log], common_delay: bool = Fa
             for index, axis in enumerate(components.get(name, list(axes))):
                 if name == "phase":
                     unit, deviation = _CHANGE_PRIORS[axis.split(" ")[0]]
-                if name == "trim" and axis in "KMN":
-                    unit, deviation = "N m", 0.5
                 plant = f"current.{axis}" if name == "current" else axis if name == "delay" else ""
                 full_name = f"{label} {axis or 'all samples'}".strip() + suffix
                 parameters.append(Parameter(full_name, unit, name, 0.0, deviation, plant=plant, index=index, run=run))
@@ -141,7 +139,7 @@ def with_values(vehicle: Vehicle, parameters: Sequence[Parameter], values: Array
     """Return a vehicle with identified values; values (p,)."""
     changed: dict[str, Any] = {name: np.array(getattr(vehicle, name)) for name in (
         "added_mass", "linear_damping", "quadratic_damping", "r_B", "r_G", "inertia", "thruster_matrix",
-        "thrust_time_constant", "mass", "weight", "buoyancy",
+        "thrust_time_constant", "mass", "weight", "buoyancy", "trim",
     )}  # fmt: skip
     for p, value in zip(parameters, values, strict=True):
         if p.kind == "lag":
@@ -175,7 +173,7 @@ def setting_of(
     n, plant, delays = forces.thrusters, dict[str, float](), dict[str, float]()
     vectors = {
         "thrust": np.ones(n), "asymmetry": np.zeros(n), "phase": np.zeros(len(CHANGES)), "force": np.zeros(3),
-        "trim": np.zeros(6), "lever": np.zeros(3), "bias": np.zeros(3), "scale": np.zeros(1),
+        "lever": np.zeros(3), "bias": np.zeros(3), "scale": np.zeros(1),
     }  # fmt: skip
     for p, x in zip(parameters, values, strict=True):
         if p.run not in (None, run):
@@ -190,7 +188,6 @@ def setting_of(
             case kind:
                 vectors[kind][p.index] = x
     actuation = forces.actuation(lag, vectors["thrust"], vectors["asymmetry"], vectors["phase"])
-    actuation.wrench[:, 0] += vectors["trim"]
     errors = Errors(vectors["lever"], float(vectors["scale"][0]), vectors["bias"])
     return Setting(plant, actuation, vectors["force"], errors, delays)
 
@@ -211,7 +208,7 @@ def _vehicle_element(name: str) -> tuple[str, tuple[int, ...]]:
     if match := re.fullmatch(r"(\w+)\[([\d,]+)\]", name):
         return match[1], tuple(int(i) - 1 for i in match[2].split(","))
     attribute, _, axes = name.partition(".")
-    return attribute, tuple("xyz".index(axis) for axis in axes)
+    return attribute, tuple(("XYZKMN" if attribute == "trim" else "xyz").index(axis) for axis in axes)
 
 
 def _is_selected(p: Parameter, match: re.Match[str]) -> bool:
@@ -241,6 +238,10 @@ def _elements(vehicle: Vehicle, key: str) -> Iterator[Parameter]:
             symbol = "r_G" if name == "center_of_gravity" else "r_B"
             for i, x in enumerate(getattr(vehicle, symbol)):
                 yield Parameter(f"{key}.{i + 1}", "m", "plant", float(x), _CENTER, plant=f"{symbol}.{'xyz'[i]}")
+        case "trim":
+            for i, x in enumerate(vehicle.trim.tolist()):
+                unit = "N" if i < 3 else "N m"
+                yield Parameter(f"{key}.{i + 1}", unit, "plant", x, _TRIM[i > 2], plant=f"trim.{'XYZKMN'[i]}")
         case "added_mass":
             A = vehicle.added_mass
             body = np.diag(vehicle.mass_matrix) - np.diag(A)

@@ -31,7 +31,7 @@ HORIZONS = (2.0, 5.0, 10.0)  # s, lengths of the predictions
 AUTO = "auto"  # in place of names of nuisances
 _COUPLINGS = tuple(f"hydrodynamics.added_mass.{i}.{j}" for i in (1, 2, 3) for j in range(i + 1, 7))
 _HORIZONS = (2.0, 5.0)  # s, of the predictions that are compared
-_HORIZONTAL = 2  # components of the trim along forward and right: the vertical one is that of the buoyancy
+_TRIM = ("hydrostatics.trim.1", "hydrostatics.trim.2")  # forward and right: the vertical one is that of the buoyancy
 _FOLDS = 2
 _MIN_GAIN = 1e-3
 _CLEAR = 1.0  # standard errors of the mean over the runs, by which a choice must be better
@@ -200,7 +200,7 @@ def choose_structure(logs: Sequence[Log], vehicle: Vehicle, keys: Sequence[str] 
         raise IdentificationError(f"--nuisance {AUTO}: has {len(logs)} runs, expected {2 * _FOLDS} or more to compare")
     base = [_shared(p) for p in free_parameters(vehicle, keys or TRANSLATION_FREE)]
     groups = {
-        "trim": [_shared(p) for p in nuisances(("trim",), logs) if p.index < _HORIZONTAL],
+        "trim": [key for key in _TRIM if key not in base],
         "current": [_shared(p) for p in nuisances(("current",), logs)],
         "lever": [_shared(p) for p in nuisances(("lever",), logs)],
         "scale": [_shared(p) for p in nuisances(("scale",), logs)],
@@ -226,12 +226,12 @@ def choose_structure(logs: Sequence[Log], vehicle: Vehicle, keys: Sequence[str] 
         choices.append(replace(choice, is_taken=choice.gain > 0.0 and not zero))
         if choices[-1].is_taken:
             zero, best = zero | removed, scores
-    every = [*free_parameters(vehicle, (*(keys or TRANSLATION_FREE), *(() if keys else _COUPLINGS)))]
-    every += nuisances(("current", "delay", "lever", "scale", "trim"), logs, common_delay=True)
+    every = free_parameters(vehicle, (*(keys or TRANSLATION_FREE), *_TRIM, *(() if keys else _COUPLINGS)))
+    every += nuisances(("current", "delay", "lever", "scale"), logs, common_delay=True)
     absent = [p for p in every if _shared(p) in zero]
     return Structure(
         with_values(vehicle, absent, np.zeros(len(absent))),
-        tuple(p for p in every if _shared(p) in taken - zero and (p.kind != "trim" or p.index < _HORIZONTAL)),
+        tuple(p for p in every if _shared(p) in taken - zero),
         tuple(choices), dict.fromkeys(TOPICS, float(np.mean([fold.delay for fold in folds]))),
     )  # fmt: skip
 
@@ -246,7 +246,7 @@ def _fold(logs: Sequence[Log], vehicle: Vehicle, base: Sequence[str], candidates
     parameters = [known[name] for name in base] + nuisances(("delay",), train, common_delay=True)
     done = fit(train, vehicle, parameters, turns_measured=True)
     added = [known[name] for name in candidates if name in known]
-    added += [p for p in nuisances(("current", "lever", "scale", "trim"), train) if _shared(p) in candidates]
+    added += [p for p in nuisances(("current", "lever", "scale"), train) if _shared(p) in candidates]
     every = [*done.parameters, *added]
     values = np.concatenate([done.values, [p.start for p in added]])
     problem = Residuals(done.logs, vehicle, every, done.windows, done.step, turns_measured=True)

@@ -25,7 +25,7 @@ from plant_fmu.vehicle import Vehicle
 
 _START_DEVIATIONS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0)  # m, rad, m/s, rad/s
 _TURNS = ("attitude", "angular_velocity")  # topics that may be inputs
-_MOTION_KINDS = ("plant", "lag", "thrust", "asymmetry", "phase", "current", "force", "trim")
+_MOTION_KINDS = ("plant", "lag", "thrust", "asymmetry", "phase", "current", "force")
 _FORCES = range(12, 15)  # indices of a window's force behind those of its state
 _FORCE = 0.5  # N, standard deviation of a random force before any residual is known
 _MIN_FORCE = 0.01  # N
@@ -212,10 +212,6 @@ class Residuals:
                 names[row] = p.plant
             elif p.kind == "force":
                 force[row, p.index] = 1.0
-            elif p.kind == "trim":
-                inputs[row] = len(wrenches)
-                wrenches.append(np.zeros((inside.stop - inside.start, 2, 6)))
-                wrenches[-1][:, 0, p.index] = 1.0
             else:
                 inputs[row] = len(wrenches)
                 actuation = setting.actuation

@@ -35,7 +35,7 @@ class Margin:
 class ThrustMargin:
     """Forces that the thrusters of a vehicle at rest can give while its attitude is kept."""
 
-    hold: tuple[float, ...]  # (6,) N, N m, body frame: wrench against current, weight and buoyancy
+    hold: tuple[float, ...]  # (6,) N, N m, body frame: wrench against current, weight, buoyancy and trim
     drag: float  # N, drag of the current
     excess_weight: float  # N, W - B
     thrust: Margin | None  # least over the directions, without `hold`; None if the limits exclude a zero wrench
@@ -49,7 +49,8 @@ def held_wrench(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array)
     relative = np.zeros(6)
     relative[:3] = -rotation_matrix(quaternion).T @ current
     drag = damping(np.array(vehicle.linear_damping), np.array(vehicle.quadratic_damping), relative) * relative
-    wrench: Array = coriolis(np.array(vehicle.added_mass), relative) @ relative + drag + regressor(quaternion) @ phi
+    turning = coriolis(np.array(vehicle.added_mass), relative) @ relative
+    wrench: Array = turning + drag + regressor(quaternion) @ phi - vehicle.trim
     return wrench
 
 
@@ -61,7 +62,7 @@ def thrust_margin(vehicle: Vehicle, phi: Array, quaternion: Array, current: Arra
     *without, left = least_margins(vehicle, quaternion, hold, ~np.eye(n + 1, n, dtype=bool))
     return ThrustMargin(
         hold=tuple(hold.tolist()),
-        drag=float(np.linalg.norm(held_wrench(vehicle, np.zeros(4), quaternion, current)[:3])),
+        drag=float(np.linalg.norm((held_wrench(vehicle, np.zeros(4), quaternion, current) + vehicle.trim)[:3])),
         excess_weight=float(phi[0]),
         thrust=least_margins(vehicle, quaternion, np.zeros(6), np.ones((1, n)))[0],
         left=left,

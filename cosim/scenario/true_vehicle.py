@@ -76,4 +76,5 @@ def _split_name(name: str) -> tuple[str, tuple[int, ...]]:
     if indexed:
         return indexed[1], tuple(int(i) - 1 for i in indexed.groups()[1:] if i is not None)
     stem, _, axes = name.partition(".")
-    return stem, tuple("xyz".index(axis) for axis in axes if axis in "xyz")
+    letters = "XYZKMN" if stem == "trim" else "xyz"
+    return stem, tuple(letters.index(axis) for axis in axes if axis in letters)

@@ -24,6 +24,7 @@ def vehicle_model(vehicle: Vehicle) -> VehicleModel:
         thrust_min=np.array(vehicle.thrust_min, dtype=float),
         thrust_max=np.array(vehicle.thrust_max, dtype=float),
         thrust_time_constant=np.array(vehicle.thrust_time_constant, dtype=float),
+        trim=np.array(vehicle.trim, dtype=float),
     )
     works = ~np.eye(vehicle.n_thrusters + 1, vehicle.n_thrusters, dtype=bool)
     left = passive_axes(model.thruster_matrix, model.thrust_min * works, model.thrust_max * works)

@@ -159,7 +159,7 @@ class _Plant:
         f_G, f_B = v.weight * down, -v.buoyancy * down
         g = -np.concatenate((f_G + f_B, np.cross(v.r_G, f_G) + np.cross(v.r_B, f_B)))
 
-        acceleration = self.inverse @ (tau - (rigid + added + damping) @ nu - g)
+        acceleration = self.inverse @ (tau + v.trim - (rigid + added + damping) @ nu - g)
         rates = np.clip(gap, -self.rate_limit, self.rate_limit)
         return np.concatenate((R @ velocity + self.current, (R @ S).ravel(), acceleration, rates))
 

@@ -104,7 +104,8 @@ void plant_derivative(const Plant *plant, const Drift *drift, double time, const
     quaternion_rate(e, omega, rate + 3);
 
     memcpy(nu_r, nu, sizeof nu_r);
-    memcpy(wrench, tau, sizeof wrench);
+    for (int i = 0; i < 6; i++)
+        wrench[i] = tau[i] + p->trim[i];
     multiply6(plant->derived.mass_matrix, nu, momentum);
     if (plant->derived.has_current)
         add_current_effects(plant, drift, time, rigid, (const double(*)[3])R, rate, nu_r, momentum, wrench);

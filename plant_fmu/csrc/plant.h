@@ -48,6 +48,7 @@ typedef struct {
     double inertia[6];                         /* kg m2, about the body origin: elements xx yy zz xy xz yz */
     double r_G[3], r_B[3];                     /* m, centers of gravity and of buoyancy */
     double weight, buoyancy;                   /* N */
+    double trim[6];                            /* N, N m: constant wrench on the body */
     double added_mass[6][6];                   /* upper triangle */
     double linear_damping[6];                  /* N s/m, N m s/rad */
     double quadratic_damping[6];               /* N s2/m2, N m s2/rad2 */

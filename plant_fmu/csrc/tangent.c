@@ -183,7 +183,8 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
         dnu_c_rate[i] -= i < 3 ? first[i] + second[i] : 0.0;
     }
 
-    memcpy(dwrench, dtau, sizeof dwrench);
+    for (int i = 0; i < 6; i++)
+        dwrench[i] = dtau[i] + dp->trim[i];
 
     /* momenta of the body and of the water; M_RB nu itself is linear in nu, so its own tangent gives it */
     double a[6], da[6], added[6], dadded[6], term[6];

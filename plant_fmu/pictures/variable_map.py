@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 # prefixes of parameters' names, by their family
 FAMILIES = {
-    "body": ("mass", "inertia", "r_G", "r_B", "weight", "buoyancy", "hull_radius"),
+    "body": ("mass", "inertia", "r_G", "r_B", "weight", "buoyancy", "trim", "hull_radius"),
     "water on the body": ("added_mass", "linear_damping", "quadratic_damping"),
     "thrusters": ("thruster_matrix", "thrust_"),
     "wrench input": ("wrench_",),

@@ -98,8 +98,8 @@ _WATER = ("time", "position.z", "current*", "seed")
 _BOTTOM = ("position.z", "bottom_depth")
 _MOTION = (
     "time", "position.z", "quaternion.*", "velocity.*", "actuator.*", "thrust*", "wrench*", "mass", "inertia.*",
-    "r_G.*", "r_B.*", "weight", "buoyancy", "added_mass*", "linear_damping*", "quadratic_damping*", "current*", "seed",
-    "free_surface", "hull_radius", "bottom_*", "substep", "load.*", "supply_voltage",
+    "r_G.*", "r_B.*", "weight", "buoyancy", "trim.*", "added_mass*", "linear_damping*", "quadratic_damping*",
+    "current*", "seed", "free_surface", "hull_radius", "bottom_*", "substep", "load.*", "supply_voltage",
 )  # fmt: skip
 
 
@@ -206,6 +206,10 @@ def _parameters(vehicle: Vehicle) -> Iterator[Variable]:
             yield _parameter(f"{name}.{axis}", f"{name}[{i}]", q.LEVER, f"Center of {what}, body {axis}", values[i])
     yield _parameter("weight", "weight", q.WEIGHT, "Weight", vehicle.weight)
     yield _parameter("buoyancy", "buoyancy", q.WEIGHT, "Buoyancy", vehicle.buoyancy)
+    for i, name in enumerate(FORCES):
+        kind, quantity = ("force", q.FORCE) if i < 3 else ("moment", q.MOMENT)
+        description = f"Constant {kind} on the body {_axis_text(i)}"
+        yield _parameter(f"trim.{name}", f"trim[{i}]", quantity, description, vehicle.trim[i])
 
     for i in range(6):
         for j in range(i, 6):

@@ -188,7 +188,7 @@ def evaluate(v, n_thrusters, drift=(0, 0, 0), drift_slope=(0, 0, 0)):
     g = -np.r_[(W - B) * k, np.cross(vector(v, "r_G") * W - vector(v, "r_B") * B, k)]
     bottom = np.r_[R.T @ contact(v, M_RB + M_A, depth, velocity_world), np.zeros(3)]
     force = np.array(tau) - coriolis(M_RB, nu) @ nu - coriolis(M_A, nu_r) @ nu_r - damping * nu_r - g
-    force = force + bottom + external_wrench(v, R)
+    force = force + vector(v, "trim", FORCES) + bottom + external_wrench(v, R)
     nu_rate = np.linalg.solve(M_RB + M_A, force + M_A @ nu_c_rate)
     out |= {f"der(velocity.{a})": x for a, x in zip(VELOCITIES, nu_rate, strict=True)}
 

@@ -28,6 +28,7 @@ class Dynamics(NamedTuple):
     inverse_mass: Matrix6  # 1/kg, 1/(kg m), 1/(kg m2): M^-1
     linear_damping: Vector6  # N s/m, N m s/rad
     quadratic_damping: Vector6  # N s2/m2, N m s2/rad2
+    trim: Vector6  # N, N m: constant wrench on the body
     translational_mass: float  # kg, mean over the three axes
     rigid_mass: float  # kg, without added mass
     braking: Array  # (m + 1,) m/s2, worst direction: with thruster j lost, and last with all working
@@ -73,6 +74,7 @@ def make_dynamics(vehicle: VehicleModel, braking: Array, max_speed: float = UNLI
         inverse_mass=inverse,
         linear_damping=vehicle.linear_damping.copy(),
         quadratic_damping=vehicle.quadratic_damping.copy(),
+        trim=vehicle.trim.copy(),
         translational_mass=mean,
         rigid_mass=float(vehicle.rigid_mass[0, 0]),
         braking=np.asarray(braking) / mean,
@@ -166,7 +168,7 @@ def free_wrench(dynamics: Dynamics, R: Matrix3, velocity: Vector3, omega: Vector
     force = loads.drag * drag[:3] + (loads.net_weight * k - cross(omega, momentum[:3]))
     moment = drag[3:] - cross(k, loads.moments) - cross(omega, momentum[3:]) - cross(nu_r[:3], momentum[:3])
     moment[2] += loads.yaw_moment
-    return np.concatenate((force, moment))
+    return np.concatenate((force, moment)) + dynamics.trim
 
 
 def drag_acceleration(dynamics: Dynamics, R: Matrix3, relative: Vector3) -> Vector3:

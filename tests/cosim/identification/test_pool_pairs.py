@@ -42,12 +42,11 @@ def true_r2(folder, runs):
     vehicle = replace(
         load_vehicle(folder / "vehicle.toml"), mass=MASS, weight=WEIGHT, buoyancy=TRUE["buoyancy"], inertia=INERTIA,
         r_B=TRUE["r_B"], added_mass=TRUE["added_mass"], linear_damping=TRUE["linear"],
-        quadratic_damping=TRUE["quadratic"],
+        quadratic_damping=TRUE["quadratic"], trim=TRUE["trim"],
     )  # fmt: skip
     logs = [load_log(run, vehicle) for run in runs]
-    parameters = nuisances(("delay", "trim"), logs, common_delay=True)
-    late = TRUE["delay"] + TRUE["lag"]
-    values = np.array([late if p.kind == "delay" else TRUE["trim"][p.index] for p in parameters])
+    parameters = nuisances(("delay",), logs, common_delay=True)
+    values = np.array([TRUE["delay"] + TRUE["lag"]])
     found = validate(logs, vehicle, parameters, values, 0.04, (2.0, 5.0), (True,))
     return {p.horizon: p.r2 for p in found if p.topic == "velocity"}
 
@@ -76,6 +75,7 @@ def test_pool_pairs_are_predicted_nearly_as_well_as_by_the_true_vehicle(tmp_path
     vehicle = load_vehicle(out)
     assert np.diag(vehicle.added_mass)[:3] == pytest.approx(np.diag(TRUE["added_mass"])[:3], rel=0.2)
     assert vehicle.buoyancy - vehicle.weight == pytest.approx(TRUE["buoyancy"] - 112.8, abs=0.5)
+    assert vehicle.trim[:2] == pytest.approx(TRUE["trim"][:2], abs=0.5) and not vehicle.trim[2:].any()
     page = out.with_suffix(".html").read_text()
     command = re.search(r"cosim identify [^<]*--out mine.toml", page)
     words = shlex.split(command[0].replace("&#39;", "'"))
