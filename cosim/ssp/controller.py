@@ -36,6 +36,7 @@ thrusters, are those of the scenario; they are no parameters.
 
 Numbers of shapes are those that the shape works with: unit vectors and rotation matrices must stay such."""
 
+_OF_LAW = ("wrench.", "thrust[", "estimate.", "law.gains.")  # beginnings of the names of variables of a law
 _MIN_GAIN, _MAX_GAIN = 1e-9, 1e9  # bounds of gains
 _PERIOD = Quantity("s", 1e-6, 1e6)  # period of the law
 # units of gains by the unit of the goal's g; the gains are documented for m2
@@ -46,15 +47,15 @@ _UNITS_BY_GOAL = {
 _GAIN_UNITS = {"m2": "N/m2", "m": "N/m", "": "N", "rad": "N/rad"}
 
 
-def controller_component(scenario: Scenario) -> Component:
-    """Make the component of a scenario's controller."""
+def controller_component(scenario: Scenario, has_law: bool = True) -> Component:
+    """Make the component of a scenario's controller; one that has no law senses and evaluates regions alone."""
     regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions)]
     loop = Loop(scenario)
     files = translate_controller(loop, scenario, regions, prefixes(regions))
-    rows = tuple(_variables(scenario, regions, loop))
+    rows = tuple(v for v in _variables(scenario, regions, loop) if has_law or not v.name.startswith(_OF_LAW))
     return Component(
         name="controller",
-        description=f"Law {scenario.law.name} of the scenario: {scenario.title}",
+        description=f"{f'Law {scenario.law.name}' if has_law else 'Regions'} of the scenario: {scenario.title}",
         variables=rows,
         sources=_sources(files),
         contents=lambda fmi: contents("Controller", _WORDS, rows, fmi),

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib import metadata
+from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
-from plant_fmu.component import Component
 from plant_fmu.markup import xml_text
 from plant_fmu.quantities import UNITS, base_unit
-from plant_fmu.variables import Variable
 
 _NAMESPACES = {
     "xmlns:ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
@@ -22,14 +20,22 @@ _NAMESPACES = {
 }
 
 
-@dataclass(frozen=True)
-class Part:
+class Connector(NamedTuple):
+    """An input or output with a connector."""
+
+    name: str
+    kind: str  # "input" or "output"
+    unit: str
+    description: str
+
+
+class Part(NamedTuple):
     """One FMU of the system."""
 
     name: str
     source: str  # path of the FMU in the archive
-    component: Component
-    connectors: tuple[str, ...]  # names of the inputs and outputs with a connector
+    description: str
+    connectors: tuple[Connector, ...]
 
     @property
     def parameters(self) -> str:
@@ -37,13 +43,12 @@ class Part:
         return self.source.replace(".fmu", ".ssv")
 
 
-@dataclass(frozen=True)
-class Wire:
-    """Connection of outputs of one part to the inputs of the same names of another."""
+class Wire(NamedTuple):
+    """Connections of outputs of one part to inputs of another."""
 
     start: str  # name of the part with the outputs
     end: str  # name of the part with the inputs
-    names: tuple[str, ...]  # names of the variables
+    names: tuple[tuple[str, str], ...]  # names of each output and its input
 
 
 def structure(
@@ -59,15 +64,14 @@ def structure(
     elements = ET.SubElement(system, "ssd:Elements")
     units: set[str] = set()
     for part in parts:
-        connected = [v for v in part.component.variables if v.name in part.connectors]
-        units |= {v.quantity.unit for v in connected}
-        _add_part(elements, part, connected)
+        units |= {connector.unit for connector in part.connectors}
+        _add_part(elements, part)
     connections = ET.SubElement(system, "ssd:Connections")
     for wire in wires:
-        for signal in wire.names:
+        for start, end in wire.names:
             ET.SubElement(
                 connections, "ssd:Connection",
-                startElement=wire.start, startConnector=signal, endElement=wire.end, endConnector=signal,
+                startElement=wire.start, startConnector=start, endElement=wire.end, endConnector=end,
             )  # fmt: skip
 
     _annotate_for_omsimulator(system, step)
@@ -100,16 +104,15 @@ def _annotate_for_omsimulator(system: ET.Element, step: float) -> None:
     )  # fmt: skip
 
 
-def _add_part(parent: ET.Element, part: Part, variables: Sequence[Variable]) -> None:
+def _add_part(parent: ET.Element, part: Part) -> None:
     element = ET.SubElement(
         parent, "ssd:Component",
         name=part.name, type="application/x-fmu-sharedlibrary", source=part.source, implementation="CoSimulation",
-        description=part.component.description,
+        description=part.description,
     )  # fmt: skip
     connectors = ET.SubElement(element, "ssd:Connectors")
-    for v in variables:
-        kind = "input" if v.role == "input" else "output"
-        connector = ET.SubElement(connectors, "ssd:Connector", name=v.name, kind=kind, description=v.description)
-        ET.SubElement(connector, "ssc:Real", {"unit": v.quantity.unit} if v.quantity.unit else {})
+    for name, kind, unit, description in part.connectors:
+        connector = ET.SubElement(connectors, "ssd:Connector", name=name, kind=kind, description=description)
+        ET.SubElement(connector, "ssc:Real", {"unit": unit} if unit else {})
     bindings = ET.SubElement(element, "ssd:ParameterBindings")
     ET.SubElement(bindings, "ssd:ParameterBinding", type="application/x-ssp-parameter-set", source=part.parameters)

@@ -8,12 +8,13 @@ from pathlib import Path
 
 from cosim.errors import RunError
 from cosim.results.file_copies import files_of
-from cosim.scenario.law_factory import require_no_fmus
+from cosim.scenario.law_factory import require_builtin_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import start_values
 from cosim.ssp.arbiter import arbiter_component
-from cosim.ssp.controller import controller_component
-from cosim.ssp.structure import Part, Wire, structure
+from cosim.ssp.controller import controller_component, prefixes
+from cosim.ssp.own_fmus import ARBITER, CONTROLLER, PLANT, STAND_IN, own_fmus, own_wires
+from cosim.ssp.structure import Connector, Part, Wire, structure
 from cosim.ssp.variable_groups import osp_model_description
 from fuzzy_arbiter import ArbiterError
 from fuzzy_arbiter.export import to_c
@@ -23,7 +24,7 @@ from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import NATIVE
 from plant_fmu.component import Component
 from plant_fmu.contents.parameter_set import parameter_set
-from plant_fmu.variables import AXES, FORCES, VELOCITIES
+from plant_fmu.variables import AXES, FORCES, VELOCITIES, Variable
 from plant_fmu.vehicle_component import make_vehicle_component
 
 _EXACT = ("closed", "exact")  # engines whose weights are those of the closed form
@@ -42,24 +43,31 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
     _require(scenario)
     out = Path(out)
     require_writable(out)
+    own = own_fmus(scenario)
     components = {
-        "plant": plant_component(scenario),
-        "controller": controller_component(scenario),
-        "arbiter": arbiter_component(scenario),
+        PLANT: plant_component(scenario, any(one.fmu is not scenario.law.fmu for one in own)),
+        CONTROLLER: _controller(scenario),
+        ARBITER: arbiter_component(scenario),
     }
-    wires = _wires(components)
-    parts = [
-        Part(name, f"resources/{name}.fmu", component, _connectors(name, component, wires))
-        for name, component in components.items()
-    ]
+    regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions)]
+    named = {"goal" if i == 0 else region.name: prefix
+             for i, (region, prefix) in enumerate(zip(regions, prefixes(regions), strict=True))}  # fmt: skip
+    outputs = {name: {v.name for v in c.variables if _is_output(v)} for name, c in components.items()}
+    wires = [*_wires(components), *own_wires(scenario, own, named, outputs)]
+    parts = [Part(name, f"resources/{name}.fmu", component.description, _connectors(name, component, wires))
+             for name, component in components.items()]  # fmt: skip
     time = scenario.time
-    members = {part.source: _fmu(part.component, fmi, platforms) for part in parts}
+    members = {part.source: _fmu(components[part.name], fmi, platforms) for part in parts}
     for part in parts:
-        component = part.component
+        component = components[part.name]
         values = [(v, v.start) for v in component.variables if v.role == "parameter"]
         members[part.parameters] = parameter_set(part.name, f"{part.name} of {scenario.title}", values).encode()
-        groups = osp_model_description(component, part.connectors)
+        groups = osp_model_description(component, [connector.name for connector in part.connectors])
         members[f"resources/{component.name}_OspModelDescription.xml"] = groups.encode()
+    for one in own:
+        part = Part(one.fmu.name, f"resources/{one.fmu.name}.fmu", f"FMU {one.file.path.name}", one.connectors)
+        members |= {part.source: one.file.path.read_bytes(), part.parameters: one.parameters()}
+        parts.append(part)
     description = structure(scenario.name, scenario.title, parts, wires, time.duration, time.step)
     members["SystemStructure.ssd"] = description.encode()
     origin = {f"documentation/{name}": content for name, content in files_of(scenario).items()}
@@ -72,30 +80,42 @@ def _wires(components: Mapping[str, Component]) -> list[Wire]:
     roles = {name: {v.name: v.role for v in component.variables} for name, component in components.items()}
     return [
         Wire(start, end, tuple(
-            name for name, role in roles[end].items()
+            (name, name) for name, role in roles[end].items()
             if role == "input" and roles[start].get(name) in ("state", "output")
         ))
         for start, end in permutations(components, 2)
     ]  # fmt: skip
 
 
-def _connectors(part: str, component: Component, wires: Sequence[Wire]) -> tuple[str, ...]:
-    """Return the names of a component's real outputs, and of its inputs that are connected."""
+def _connectors(part: str, component: Component, wires: Sequence[Wire]) -> tuple[Connector, ...]:
+    """Return the connectors of a component: of its real outputs, and of its inputs that are connected."""
     # FMPy sets inputs that have a connector but no connection to the value of another one.
-    connected = {name for wire in wires if wire.end == part for name in wire.names}
+    connected = {end for wire in wires if wire.end == part for _, end in wire.names}
     return tuple(
-        v.name for v in component.variables
-        if v.type == "real" and not v.local and (v.role in ("state", "output") or v.name in connected)
-    )  # fmt: skip
+        Connector(v.name, "output" if _is_output(v) else "input", v.quantity.unit, v.description)
+        for v in component.variables
+        if _is_output(v) or (v.role == "input" and v.name in connected)
+    )
 
 
-def plant_component(scenario: Scenario) -> Component:
+def _is_output(v: Variable) -> bool:
+    return v.type == "real" and not v.local and v.role in ("state", "output")
+
+
+def _controller(scenario: Scenario) -> Component:
+    """Make the controller; beside a law that is an FMU it senses and evaluates regions alone."""
+    if not scenario.law.fmu:
+        return controller_component(scenario)
+    return controller_component(scenario.replace({"law": {"name": STAND_IN}}), has_law=False)
+
+
+def plant_component(scenario: Scenario, coupled: bool = False) -> Component:
     """Make the component of a scenario's plant, with the scenario's start values."""
     start = {name: float(value) for name, value in start_values(scenario).items()}
     for failure in scenario.failures:  # failures at time 0 are start values, since connections act after the first step
         if failure.time <= 0.0 and not failure.stuck:
             start[f"thrust_effectiveness[{failure.thruster}]"] = failure.effectiveness
-    coupled = bool(scenario.failures or scenario.outages)
+    coupled = coupled or bool(scenario.failures or scenario.outages)
     return make_vehicle_component(scenario.vehicle, start, scenario.time.duration, scenario.time.step, coupled)
 
 
@@ -109,7 +129,9 @@ def _fmu(component: Component, fmi: int, platforms: str) -> bytes:
 def _require(scenario: Scenario) -> None:
     """Raise a RunError for features that the FMUs of a system do not support."""
     streamed, engine = next((r.region.name for r in scenario.regions if r.streamed), ""), scenario.arbiter.engine
-    require_no_fmus(scenario, "a system of FMUs")
+    if not scenario.law.fmu:
+        require_builtin_law(scenario)
+    stuck, late = any(failure.stuck for failure in scenario.failures), scenario.time.control != scenario.time.step
     from_file = next((r.region.name for r in scenario.regions if hasattr(r.region.shape, "file")), "")
     for ok, key, received, expected in (
         (
@@ -118,6 +140,9 @@ def _require(scenario: Scenario) -> None:
             repr(engine),
             "'closed' or 'exact', such as by --set arbiter.engine=closed",
         ),
+        (not scenario.plant_fmu, "plant.file", "given", "none"),
+        (not (scenario.law.fmu and late), "time.control", f"{scenario.time.control:g} s", "time.step with law.file"),
+        (not (scenario.law.fmu and stuck), "failures", "of stuck thrusters", "others with law.file"),
         (not scenario.commands.enabled, "commands.enabled", "true", "false: a system takes no commands"),
         (not scenario.goal_streamed, "goal.streamed", "true", "false"),
         (not from_file, f"regions.{from_file}.shape", "of a file", "a shape whose numbers can be parameters"),

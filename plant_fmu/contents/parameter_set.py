@@ -25,17 +25,23 @@ def ssv(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> str:
 
 def parameter_set(name: str, description: str, values: Iterable[tuple[Variable, float]]) -> str:
     """Return values of variables as a parameter set."""
+    rows = ((v.name, v.description, v.type.capitalize(), v.text(value), v.quantity.unit) for v, value in values)
+    return parameter_file(name, description, rows)
+
+
+def parameter_file(name: str, description: str, rows: Iterable[tuple[str, str, str, str, str]]) -> str:
+    """Return a parameter set of rows of name, description, type, text of the value, and unit."""
     root = ET.Element("ssv:ParameterSet", _NAMESPACES, version="1.0", name=name, description=description)
     root.set("license", "BSD-3-Clause")
     root.set("generationTool", f"subreach {metadata.version('subreach')}")
     parameters = ET.SubElement(root, "ssv:Parameters")
     used: dict[str, None] = {}  # a set that keeps its order
-    for v, value in values:
-        parameter = ET.SubElement(parameters, "ssv:Parameter", name=v.name, description=v.description)
-        element = ET.SubElement(parameter, f"ssv:{v.type.capitalize()}", value=v.text(value))
-        if v.quantity.unit:
-            element.set("unit", v.quantity.unit)
-            used[v.quantity.unit] = None
+    for parameter_name, about, kind, text, unit in rows:
+        parameter = ET.SubElement(parameters, "ssv:Parameter", name=parameter_name, description=about)
+        element = ET.SubElement(parameter, f"ssv:{kind}", value=text)
+        if unit:
+            element.set("unit", unit)
+            used[unit] = None
     if used:
         units = ET.SubElement(root, "ssv:Units")
         for unit in used:
