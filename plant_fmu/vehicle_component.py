@@ -10,9 +10,9 @@ from plant_fmu.compiling.sources import plant_sources
 from plant_fmu.component import STEP, STOP_TIME, Component
 from plant_fmu.contents import contents
 from plant_fmu.errors import BuildError
-from plant_fmu.former_names import present_name
 from plant_fmu.toml_tables import hint
 from plant_fmu.variables import Variable, described, show_small, variables, with_arrays
+from plant_fmu.variables.former_names import present_name
 from plant_fmu.vehicle import Vehicle
 
 

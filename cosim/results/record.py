@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from cosim.errors import RunError
 from cosim.io.format_number import require_format
 from cosim.simulation.signals import Array, Column
-from plant_fmu.former_names import present_name
+from plant_fmu.variables.former_names import present_name
 
 log = logging.getLogger(__name__)
 

@@ -16,10 +16,10 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Column
 from plant_fmu.checking.fmu_file import NATIVE, FmuFile, read_fmu
 from plant_fmu.errors import PlantFmuError
-from plant_fmu.former_names import present_name
 from plant_fmu.model_variables import ModelVariable
 from plant_fmu.quantities import UNITS, base_unit
 from plant_fmu.toml_tables import hint
+from plant_fmu.variables.former_names import present_name
 
 Definition = Mapping[str, str]  # attributes of ``BaseUnit`` of a unit
 

@@ -13,8 +13,8 @@ from plant_fmu.checking.fmu_file import FmuFile, read_fmu
 from plant_fmu.checking.process import Importer, run_importer
 from plant_fmu.checking.task import Result, Task
 from plant_fmu.errors import TaskError
-from plant_fmu.former_names import present_name
 from plant_fmu.toml_tables import hint
+from plant_fmu.variables.former_names import present_name
 
 REFERENCE = "FMPy"  # importer with which the others are compared
 CS_TOLERANCE = 1e-9  # relative to the larger of an output and one: two masters differ in how they add up the time

@@ -1,6 +1,6 @@
 """FMUs stepped from Python: variables as arrays and by name, states, derivatives.
 
-Imports: nothing.
+Imports: variables.
 """
 
 from plant_fmu.running.channels import Channel, Channels

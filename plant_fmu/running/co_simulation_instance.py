@@ -15,7 +15,6 @@ from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
 from numpy.typing import NDArray
 
 from plant_fmu.errors import PlantError, StepError
-from plant_fmu.former_names import present_name
 from plant_fmu.model_variables import ModelVariable
 from plant_fmu.running.channels import DOUBLES, BoundCalls
 from plant_fmu.running.instance import Instance
@@ -23,6 +22,7 @@ from plant_fmu.running.messages import WARNING
 from plant_fmu.running.native import Native, stops_early
 from plant_fmu.running.state import Clock
 from plant_fmu.running.values import Value, convert_value, convert_values, require_settable
+from plant_fmu.variables.former_names import present_name
 
 _MAX_STEP = 1e9  # s, bound of a step
 _DISCARD = 2  # status of FMI 2.0 and 3.0

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant_fmu.errors import PlantError
-from plant_fmu.former_names import present_name
 from plant_fmu.running.channels import DOUBLES
 from plant_fmu.running.instance import Instance
+from plant_fmu.variables.former_names import present_name
 
 _NO_REFERENCES = np.empty(0, np.uint32)
 _NO_FLAGS = np.empty(0, np.bool_)

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from scipy import constants
 
-from plant_fmu import Plant, PlantError, former_names, load_vehicle
+from plant_fmu import Plant, PlantError, load_vehicle
 from plant_fmu.build import cached_fmu
-from plant_fmu.variables import variables
+from plant_fmu.variables import former_names, variables
 from plant_fmu.vehicle_component import make_vehicle_component
 from tests.plant_fmu.conftest import STATES, coupled_odin
 
