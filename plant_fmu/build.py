@@ -70,7 +70,7 @@ def build_fmu(
     arrays : bool
         True for a vehicle with arrays, such as ``thrust`` of 8, sensors on clocks, and event mode. FMI 3.0 alone.
     small : bool
-        True for a vehicle that shows body and thrusters alone, 60 variables of 330, for co-simulation.
+        True for a vehicle that shows body and thrusters alone, some 60 variables, for co-simulation.
 
     Returns
     -------
