@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from typing import Any, NamedTuple, Self
@@ -42,6 +43,8 @@ class GroundLink:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.name, self.identity, self._clock = endpoint.text, identity, clock  # s, for connections and messages
+        # in simulated time all is read at once, however loaded the machine is
+        self._max_read_time = _MAX_READ_TIME if clock is time.monotonic else math.inf
         self.stats = RxStats()
         stamps = SigningClock(None if key is None else timestamp_file(key, identity))
         frames = FrameFilter(self.stats, verifier=None if key is None else Verifier(key, stamps))
@@ -59,7 +62,7 @@ class GroundLink:
             now = time.monotonic()
             self.channel.poll(self._clock())
             received: list[ReceivedMessage] = []
-            for _, message in self._link.receive(time.perf_counter() + _MAX_READ_TIME):
+            for _, message in self._link.receive(time.perf_counter() + self._max_read_time):
                 source = message.get_srcSystem(), message.get_srcComponent(), message.get_seq()
                 received.append(ReceivedMessage(self._clock(), *source, message.get_type(), message))
                 if len(received) == _MAX_MESSAGES:
