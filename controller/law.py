@@ -141,6 +141,7 @@ class CompiledLaw:
     function: ClassVar[Any]  # plain Python in the translator's subset, or anything that can be called
     gains_type: ClassVar[type[Any]]  # a NamedTuple of floats with defaults
     above_zero: ClassVar[tuple[str, ...]] = ()  # gains that must not be 0
+    gains_for: ClassVar[str] = ""  # vehicle for which the defaults were found; "" where they hold for any
     takes_speed: ClassVar[bool] = False  # True if it keeps to `speed_limit` of its memory
     diagnostics: tuple[Diagnostic, ...] = ()
     gains: Any

@@ -12,6 +12,7 @@ EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 WRITES = {
     "fmu_alone.py": ["bluerov2.fmu"],
     "fmu_reference.py": ["bluerov2_heavy.fmu", "fmu-reference.png"],
+    "mpc.py": ["runs/mpc/report.html"],
     "own_law.py": ["runs/own-law/report.html", "runs/own-law/replay.html", "runs/own-law/summary.json"],
     "own_vehicle.py": ["frame.toml", "frame.fmu", "pool.toml", "runs/frame/record.parquet"],
     "telemetry.py": ["runs/streamed/record.parquet"],
@@ -21,6 +22,7 @@ SAYS = {
     "fmu_alone.py": "14 inputs",
     "learn_to_hold.py": "generation 29: ",
     "master.py": "clearance to the goal region +",
+    "mpc.py": "in the goal after 1",
     "own_law.py": "law own_law.py:steer: in the goal after",
     "own_vehicle.py": "for good: True",
     "telemetry.py": "last seen at",
@@ -40,8 +42,9 @@ def test_example_runs_and_writes_its_documented_files(example, tmp_path):
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.name)
 def test_importing_an_example_has_no_effect(example, tmp_path, monkeypatch, capfd):
-    if example.name == "telemetry.py":
-        pytest.importorskip("pymavlink")
+    for name, needed in (("telemetry.py", "pymavlink"), ("mpc.py", "casadi")):
+        if example.name == name:
+            pytest.importorskip(needed)
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(example), run_name=example.stem)
     assert list(tmp_path.rglob("*")) == []

@@ -85,6 +85,7 @@ class AntonelliLaw(WrenchLaw):
     function = staticmethod(step)
     memory_type = PotentialMemory
     gains_type = AntonelliGains
+    gains_for = "odin"
     above_zero = ("k_p1", "k_theta", "k_theta_moment")
 
 

@@ -51,6 +51,7 @@ class PdLaw(WrenchLaw):
     function = staticmethod(step)
     memory_type = PotentialMemory
     gains_type = PdGains
+    gains_for = "odin"
     above_zero = ("k_p1",)
     takes_speed = True
 

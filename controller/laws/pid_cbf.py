@@ -182,6 +182,7 @@ class PidCbfLaw(CompiledLaw):
     output: ClassVar[Output] = "thrusters"
     function = staticmethod(step)
     gains_type = PidCbfGains
+    gains_for = "odin"
     above_zero = ("k_p1", "observer", "pull_in", "brake")
     takes_speed = True
 

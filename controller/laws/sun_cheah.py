@@ -66,6 +66,7 @@ class SunCheahLaw(WrenchLaw):
     function = staticmethod(step)
     memory_type = PotentialMemory
     gains_type = SunCheahGains
+    gains_for = "odin"
     above_zero = ("k_p1", "gamma")
 
 

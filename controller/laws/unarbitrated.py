@@ -63,6 +63,7 @@ class UnarbitratedLaw(WrenchLaw):
     function = staticmethod(step)
     memory_type = PotentialMemory
     gains_type = UnarbitratedGains
+    gains_for = "odin"
     above_zero = ("k_p1", "gamma")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from controller import Law
 from cosim.batch.outcome import FIELDS
-from cosim.campaigns.analysis.campaign_summary import refusal_reasons, worst_table
+from cosim.campaigns.analysis.campaign_summary import refusal_reasons, rerun_command, worst_table
 from cosim.campaigns.analysis.statistics import Facts, effect, quantiles, rate
 from cosim.campaigns.runner import Campaign, carry_out
 from cosim.campaigns.store.results import Results
@@ -105,10 +105,23 @@ def summarize_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str
         **{name: rate(results.fact(name)[is_flown]) for name in FACTS},
         "quantiles": {name: quantiles(results.number(name)) for name in SPREADS},
         "worst": worst_table(results, folder),
+        "best": _best(work, results, folder),
         "effects": _measure_keys(work, results, is_flown, effect),
         "rank_correlations": _measure_keys(work, results, is_flown, _rank_correlation),
         **{key: value for key, value in work.plan.items() if key != "name"},
     }
+
+
+def _best(work: SweepWork, results: Results, folder: Path) -> dict[str, Any] | None:
+    """Return the row that settled first, of those without a violation, where keys of law and arbiter vary alone."""
+    time = results.number("settle_time")
+    sound = results.fact("settled") & ~results.fact("violated") & np.isfinite(time)
+    if not sound.any() or not all(key.startswith(("law.", "arbiter.")) for key in work.variation.keys):
+        return None
+    i = int(np.where(sound, time, np.inf).argmin())
+    row = int(results.number("row")[i])
+    changes = " ".join(f"--set {key}={results.number(key)[i]:.4g}" for key in work.variation.keys)
+    return {"row": row, "settle_time": time[i], "changes": changes, "command": rerun_command(folder, row)}
 
 
 def _measure_keys(

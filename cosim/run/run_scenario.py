@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from cosim.results.run_result import COMMANDS_LOG, Run
 from cosim.results.wording import verdict
 from cosim.run.progress import ProgressBar
 from cosim.run.run_folder import RunFolder, claim, conclude
+from cosim.scenario.foreign_gains import FIND_GAINS, foreign_gains
 from cosim.scenario.law_factory import OwnLaw, read_law, with_custom_law
 from cosim.scenario.scenario import Scenario, to_scenario
 from cosim.simulation.commands.sources import CommandQueue, LoggedCommands, ReplayedCommands
@@ -144,6 +146,8 @@ def run_scenario(
         scenario = own.in_scenario(scenario)
     elif given is not None:
         scenario = with_custom_law(given, scenario)
+    if text := foreign_gains(scenario):
+        logging.getLogger("cosim").warning("%s: %s", text, FIND_GAINS)
     replayed = None if commands_log is None else _replayed_commands(scenario, Path(commands_log))
     queue = CommandQueue()
     link: LinkThread | None = None

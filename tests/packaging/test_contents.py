@@ -97,7 +97,7 @@ def test_each_dependency_has_a_lower_bound(project):
     extras = [text for texts in project["optional-dependencies"].values() for text in texts]
     for text in (*project["dependencies"], *extras):
         assert ">=" in text or text.startswith(("subreach[", "fuzzy-arbiter[skfuzzy]==")), text
-    wanted = {"build", "campaign", "falsify", "learning", "logs", "mcap", "notebook", "numba", "rerun", "wasm"}
+    wanted = {"build", "campaign", "falsify", "learning", "logs", "mcap", "mpc", "notebook", "numba", "rerun", "wasm"}
     (everything,) = project["optional-dependencies"]["all"]
     assert set(everything.removeprefix("subreach[").removesuffix("]").split(",")) == wanted
 

@@ -64,6 +64,8 @@ def sweep_lines(summary: dict[str, Any]) -> Iterator[str]:
     for name, numbers in s["quantiles"].items():
         if numbers["0.5"] is not None:
             yield f"{name:15} {numbers['0.5']:.4g} {FIELDS[name][1]} ({numbers['0.05']:.4g} to {numbers['0.95']:.4g})"
+    if best := s["best"]:
+        yield f"best: {best['command']} (settled at {best['settle_time']:.2f} s): {best['changes']}"
     for worst in s["worst"][:1]:
         yield f"worst: {worst['command']}"
 

@@ -20,7 +20,7 @@ from cosim.campaigns.parameter_sweep import run_sweep
 from cosim.campaigns.scenes.scene_rows import SCHEMA
 from cosim.campaigns.store.folder import RESULTS
 from cosim.campaigns.store.results import make_table, to_array
-from cosim.campaigns.sweeps.design import design_of
+from cosim.campaigns.sweeps.design import Design, design_of, vary_from
 from cosim.campaigns.sweeps.sweep_rows import schema_of
 from cosim.command_line.cli import main
 from cosim.errors import RunError, ScenarioError
@@ -231,6 +231,24 @@ def test_worst_rows_carry_their_rerun_command(tmp_path, fakes):
     assert worst[0]["command"] == f"cosim rerun '{tmp_path / 'out dir'}' {worst[0]['row']}"
     one = run_sweep(paper(), design(1), tmp_path / "one").summary
     assert one["rank_correlations"][KEYS[0]]["effort"] is None and one["rows"] == 1 and not one["reasons"]
+
+
+def test_the_best_row_settles_first_without_a_violation_where_the_laws_keys_vary_alone(tmp_path, fakes):
+    assert run_sweep(paper(), design(), tmp_path / "start").summary["best"] is None
+
+    class Sound(Fake):
+        def fly(self, values, seeds):
+            result = super().fly(values, seeds)
+            result.outcomes["violated"] = seeds % 3 == 0
+            return result
+
+    fakes(Sound)
+    vary = vary_from(["law.gains.k_p1=10:30", "law.gains.k_q=5:20"])
+    done = run_sweep(paper(), Design(vary, "random", 40, 3), tmp_path / "gains")
+    rows = [row for row in rows_of(done) if row["settled"] and not row["violated"]]
+    first, best = min(rows, key=lambda row: row["settle_time"]), done.summary["best"]
+    assert (best["row"], best["settle_time"]) == (first["row"], first["settle_time"])
+    assert best["changes"] == " ".join(f"--set {of.key}={first[of.key]:.4g}" for of in vary)
 
 
 # ---- the command ----

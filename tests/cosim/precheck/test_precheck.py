@@ -59,7 +59,8 @@ EACH_SCENARIO = [name if name == "paper" else pytest.param(name, marks=pytest.ma
 @pytest.mark.parametrize("name", EACH_SCENARIO)
 def test_every_shipped_scenario_is_checkable(name):
     result = check_scenario(load_scenario(name, [CLOSED]))
-    assert {finding.topic for finding in result.findings} == {"vehicle", "law", "regions", "thrust"}
+    paper = {"vehicle", "law"} if result.law == "ismail_dunnigan" else set()
+    assert {finding.topic for finding in result.findings} == {"regions", "thrust"} | paper
     for finding in result.findings:
         assert finding.text
         assert bool(finding.advice) == (finding.status == "fails"), finding
@@ -192,8 +193,19 @@ def test_theory_conditions_apply_only_to_the_papers_law():
     changes = ("law.name=deployable", "law.gains={}", "actuation.through=thrusters")
     result = check_scenario(load_scenario("paper", [CLOSED, *changes]))
     assert result.holds
-    (law,) = (finding for finding in result.findings if finding.topic == "law")
-    assert law.status == "note" and "not checked for deployable" in law.text
+    assert {finding.topic for finding in result.findings} == {"regions", "thrust"}
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize(
+    ("vehicle", "gains", "fits"),
+    [("bluerov2", "{}", False), ("bluerov2", "{k_p1=9.0}", True), ("odin", "{}", True)],
+)
+def test_baselines_without_gains_for_a_vehicle_fail(vehicle, gains, fits):
+    changes = (f"vehicle={vehicle}", "law.name=pd", f"law.gains={gains}", "actuation.through=thrusters")
+    findings = named(check_scenario(load_scenario("paper-deployable", [CLOSED, *changes])).findings)
+    assert ("gains" not in findings) == fits
+    assert fits or "found for odin, not for bluerov2" in findings["gains"].text
 
 
 def test_attitude_regions_block_no_path_but_can_be_violated_at_the_start():

@@ -187,3 +187,11 @@ def test_run_that_is_cut_off_keeps_its_rows(tmp_path, monkeypatch, last, error):
     assert out.exists() == bool(last)
     if last:
         assert len(load_record(out)["time"]) == 151
+
+
+def test_gains_of_another_vehicle_are_named(tmp_path, caplog):
+    odin = load_scenario("paper-deployable", [*SHORT, "law.name=pd", "law.gains={}"])
+    run_scenario(odin, tmp_path / "odin", report=False)
+    assert not caplog.messages
+    run_scenario(odin.replace({"vehicle": "bluerov2_heavy"}), tmp_path / "bluerov2", report=False)
+    assert any("pd were found for odin, not for bluerov2_heavy" in message for message in caplog.messages)
