@@ -11,7 +11,7 @@ from cosim.precheck.finding import Finding
 from cosim.precheck.own_fmu import component_findings, law_fmu_findings
 from cosim.precheck.stability import gain_findings, start_weights, vehicle_findings
 from cosim.precheck.thrust import initial_force_finding, thrust_findings
-from cosim.scenario.foreign_gains import FIND_GAINS, foreign_gains
+from cosim.scenario.law_factory import FIND_GAINS, foreign_gains
 from cosim.scenario.scenario import Scenario, to_scenario
 
 

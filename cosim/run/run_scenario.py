@@ -17,8 +17,7 @@ from cosim.results.run_result import COMMANDS_LOG, Run
 from cosim.results.wording import verdict
 from cosim.run.progress import ProgressBar
 from cosim.run.run_folder import RunFolder, claim, conclude
-from cosim.scenario.foreign_gains import FIND_GAINS, foreign_gains
-from cosim.scenario.law_factory import OwnLaw, read_law, with_custom_law
+from cosim.scenario.law_factory import FIND_GAINS, OwnLaw, foreign_gains, read_law, with_custom_law
 from cosim.scenario.scenario import Scenario, to_scenario
 from cosim.simulation.commands.sources import CommandQueue, LoggedCommands, ReplayedCommands
 from cosim.simulation.master import Master, Observer

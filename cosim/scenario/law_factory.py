@@ -27,6 +27,7 @@ from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.toml_tables import hint
 
 _SOURCE = re.compile(r"(.+\.py):([^\W\d]\w*)", re.S)
+FIND_GAINS = "cosim sweep, as in docs/baselines.md#gains-for-another-vehicle, and set law.gains."
 _DIGEST = "__digest__"  # attribute of the module of a file: its SHA-256
 
 
@@ -40,6 +41,14 @@ def law_of(scenario: Scenario) -> CompiledLaw:
         scenario.time.control,
         len(scenario.regions),
     )
+
+
+def foreign_gains(scenario: Scenario) -> str:
+    """Say for which vehicle a law's gains were found, if all are its defaults and the scenario's is another."""
+    kind = LAWS.get(scenario.law.name)
+    if kind is None or kind.gains_for in ("", scenario.vehicle.name) or scenario.law.gains != kind.gains_type():
+        return ""
+    return f"gains of law {scenario.law.name} were found for {kind.gains_for}, not for {scenario.vehicle.name}"
 
 
 def require_builtin_law(scenario: Scenario) -> None:
