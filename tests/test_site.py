@@ -73,7 +73,7 @@ WITHIN = {
     "controller.law",
     "controller.potential_field",
     "controller.quaternion",
-    *(f"controller.regions.{name}" for name in ("entry", "mesh", "numbers", "region_set", "shape")),
+    *(f"controller.regions.{name}" for name in ("entry", "kinds", "mesh", "numbers", "region_set", "shape")),
 }
 
 

@@ -91,7 +91,11 @@ class RunFolder:
 
 def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunFolder:
     """Create the folder of a run and write the scenario into it."""
-    return claim_folder(out, scenario.name, files_of(scenario), overwrite)
+    try:
+        files = files_of(scenario)
+    except OSError as error:
+        raise RunError(f"{out or 'runs'}: {error.strerror or error}") from error
+    return claim_folder(out, scenario.name, files, overwrite)
 
 
 def claim_folder(out: Path | None, name: str, files: Mapping[str, bytes], overwrite: bool = False) -> RunFolder:

@@ -98,6 +98,6 @@ def test_casadi_reads_the_directional_derivatives(fmu):
 
 
 def test_importers_extra_covers_driver_requirements():
-    extra = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["importers"]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     needed = {importer.package for importer in IMPORTERS} - {"fmpy"}
-    assert {"tbb", *needed} == {package.partition(">=")[0] for package in extra}
+    assert {"tbb", *needed} == {package.partition(">=")[0] for package in extras["importers"] + extras["container"]}
