@@ -73,7 +73,9 @@ def askew(rng):
     root = rng.normal(size=(6, 6))
     mass = root @ root.T + np.diag([90.0, 80.0, 70.0, 9.0, 8.0, 7.0])
     damping, braking = rng.uniform(1.0, 30.0, (2, 6)), rng.uniform(0.1, 0.4, 9)
-    return Dynamics(mass, np.linalg.inv(mass), *damping, np.zeros(6), float(np.trace(mass[:3, :3])) / 3.0, 70.0, braking)
+    return Dynamics(
+        mass, np.linalg.inv(mass), *damping, np.zeros(6), float(np.trace(mass[:3, :3])) / 3.0, 70.0, braking
+    )
 
 
 def law_for(regions, gains=None, period=0.02):
