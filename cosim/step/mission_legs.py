@@ -108,8 +108,8 @@ def aim(model: StepModel, data: StepData) -> None:
             data.heading = arctangent(east, north) - mission.camera
     left = data.heading - data.turned
     left = arctangent(sine(left), cosine(left))
-    most = mission.turning_rate * (data.now - data.turned_at)
-    data.turned += min(max(left, -most), most)
+    max_turn = mission.turning_rate * (data.now - data.turned_at)
+    data.turned += min(max(left, -max_turn), max_turn)
     data.turned_at = data.now
     half = 0.5 * data.turned
     data.attitude = multiply(array(cosine(half), 0.0, 0.0, sine(half)), mission.attitude)
