@@ -62,7 +62,9 @@ class Flights:
         if path is not None and path.exists():
             for line in path.read_text(encoding="utf-8").splitlines():
                 flown = json.loads(line)
-                self._known[_key(flown)] = Flight(Score(*flown["score"]), flown["times"], flown["failures"])
+                self._known[_key(flown)] = Flight(
+                    msgspec.convert(flown["score"], Score), flown["times"], flown["failures"]
+                )
 
     def fly(self, gains: NmpcGains, kind: str, seed: int, longer: float) -> Flight:
         """Fly a scene for `DURATION`; fly a plain or hard one whose goal is not reached again, for `longer` [s]."""

@@ -226,7 +226,8 @@ class CompiledLaw:
     @property
     def attitude_target(self) -> Array:
         """Attitude that a mission may write before each step, and turns steadily: shape (4,), as desired."""
-        return self.desired_quaternion
+        target: Array = getattr(self.memory, "desired_quaternion", np.zeros(4))  # a memory of one's own may have none
+        return target
 
     @property
     def speed_limit(self) -> Array:

@@ -26,7 +26,7 @@ class Check:
     >>> check.holds
     True
     >>> [finding.name for finding in check.findings][:2]
-    ['Property 1', 'Property 2']
+    ['goal and regions', 'overlaps']
     """
 
     scenario: str

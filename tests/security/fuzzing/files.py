@@ -255,7 +255,10 @@ def parquet_of_a_log(seeds: Seeds) -> Case:
     return _log(seeds, "it.parquet", made.getvalue(), columns=MAP)
 
 
-@reader("telemetry log", "bytes", "cosim.logs.formats.tlog:_Frames._parse", "cosim.mavlink.wire.framing:parse_header")
+_TLOG = "cosim.logs.formats.tlog:_Frames"
+
+
+@reader("telemetry log", "bytes", f"{_TLOG}._parse", f"{_TLOG}._size_at", "cosim.mavlink.wire.framing:parse_header")
 def telemetry_log(seeds: Seeds) -> Case:
     return _log(seeds, "it.tlog", (LOGS / "small.tlog").read_bytes()[:40_000])
 
@@ -271,6 +274,7 @@ def dataflash_log(seeds: Seeds) -> Case:
     "bytes",
     "cosim.logs.records:Records._read",
     "cosim.logs.formats.ulog_messages:ULogMessages._parse",
+    "cosim.logs.formats.ulog_messages:ULogMessages._size_at",
     "cosim.logs.formats.ulog_messages:_Topic.samples",
 )
 def ulog(seeds: Seeds) -> Case:
@@ -306,8 +310,10 @@ def _bag(suffix: str, seeds: Seeds) -> Case:
     return _log(seeds, path.name, path.read_bytes(), columns=test_bags.MAP.encode())
 
 
-for _suffix, _parser in (
-    ("mcap", "bag_records:McapRecords._parse"), ("db3", "bag_database:sqlite_messages"),
-    ("bag", "bag_records:RosbagRecords._parse"),
+for _suffix, _module, _parsers in (
+    ("mcap", "bag_records", ("McapRecords._parse", "McapRecords._size_at", "McapRecords._chunk")),
+    ("db3", "bag_database", ("sqlite_messages",)),
+    ("bag", "bag_records", ("RosbagRecords._parse", "RosbagRecords._size_at", "_fields", "_ros1_time")),
 ):  # fmt: skip
-    reader(f"bag in {_suffix}", "bytes", f"cosim.logs.{_parser}", _DEFINITIONS)(partial(_bag, _suffix))
+    _names = (f"cosim.logs.{_module}:{_parser}" for _parser in _parsers)
+    reader(f"bag in {_suffix}", "bytes", *_names, _DEFINITIONS)(partial(_bag, _suffix))

@@ -23,6 +23,7 @@ METHODS = {
 }  # fmt: skip
 ITS_OWN = {  # what parses nothing that comes from outside: why
     "controller.force_limits:_cached": "an array in memory",
+    "controller.regions.distance_grid:_cached": "a file of its own cache",
     "controller.compiling.text_cache:_read_cached": "a file of its own cache, in a folder that it alone can write to",
     "cosim.mavlink.wire.framing:encode_v1": "a frame that pymavlink has just encoded",
     "cosim.companion.failsafes:Failsafes.receive": "the four bytes of a number of a message",
