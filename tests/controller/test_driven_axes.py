@@ -56,6 +56,7 @@ def is_driven(vehicle, left, least):
     return all(greatest(vehicle, axis, sign, left) > least * sizes[axis] for axis in axes for sign in (1.0, -1.0))
 
 
+@pytest.mark.medium(fast=4)
 @pytest.mark.parametrize("seed", [*range(12), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(12, 200))])
 def test_random_layout_is_driven_or_refused_by_its_axes(seed):
     vehicle = layout(seed)

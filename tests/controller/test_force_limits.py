@@ -20,6 +20,7 @@ def by_linear_program(matrix, lower, upper, direction, wrench):
     return -done.fun if done.success and done.fun <= 1e-9 else np.nan
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("count", [1, 4, 6, 7, 8, 11, pytest.param(40, marks=pytest.mark.medium)])
 def test_force_is_that_of_a_linear_program(count):
     """Random thrusters, of which some are lost, some are alike, and all may push in a plane alone."""

@@ -158,6 +158,7 @@ def test_every_rule_form_verifies(form, n):
     assert v.row_count == 2**n
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("n", [12, pytest.param(40, marks=pytest.mark.slow)])
 def test_many_criteria_are_decided_in_any_order(n):
     s = prioritized([Criterion(f"c{i}") for i in range(n)])

@@ -85,6 +85,7 @@ def motions():
         yield UNDAMPED | SPHERE | arms | body, 0.99 / swing, 1.01 / swing
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize(("values", "stable", "unstable"), list(motions()))
 def test_stability_limit_is_that_of_damping_spin_and_righting(make_slave, values, stable, unstable):
     assert fares(make_slave, stable, **values, **{"position.z": 20.0})

@@ -229,6 +229,7 @@ def test_what_a_killed_process_left_in_the_cache_is_removed_once_it_is_old(cache
     assert [path.name for path in cache.glob(".*")] == [".young.part"]
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such locks")
 @pytest.mark.parametrize("killed", [True, False])
 def test_temporary_folder_of_a_killed_process_is_removed_by_a_later_one(tmp_path, killed):

@@ -137,6 +137,7 @@ def test_path_end_follows_a_moving_goal():
         assert clearance_at(packed, 0, plan.path[plan.points - 1]) > 0.05
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("velocity", [(-0.9, 0.0, 0.0), (0.0, 0.5, 0.0), (0.4, -0.4, 0.0)])
 def test_vehicle_at_rest_steps_aside_from_a_fast_region_and_returns(velocity):
     """A ball through its place, and a vehicle that does no more than 0.5 m/s."""

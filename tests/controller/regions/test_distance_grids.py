@@ -78,7 +78,7 @@ def test_mesh_to_stay_within_is_never_larger_than_the_true_one(tmp_path):
     assert (reported >= 0.0).mean() > 0.8 * (true >= 0.0).mean()
 
 
-@pytest.mark.medium(fast=4)
+@pytest.mark.medium
 @given(st.integers(0, 2**32), st.floats(0.05, 1.0), st.floats(0.04, 0.3))
 def test_points_are_kept_out_of_by_their_radius(tmp_path_factory, seed, radius, spacing):
     rng = np.random.default_rng(seed)
@@ -157,7 +157,7 @@ def test_solid_inside_out_and_bodies_apart_are_accepted(tmp_path):
         assert clearances(shape, np.zeros((1, 3)))[0] < -0.8
 
 
-@pytest.mark.medium(fast=20)
+@pytest.mark.medium
 @given(st.data())
 def test_damaged_files_are_a_solid_or_one_line(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("damaged")

@@ -77,6 +77,7 @@ def test_flights_are_the_same_by_object_file_and_class(folder):
     assert (counted[1] > 0.0).all()
 
 
+@pytest.mark.medium
 def test_flight_has_the_bits_of_a_recorded_run(folder):
     scenario = cosim.load_scenario("paper", SHORT)
     design = cosim.Design(cosim.vary_from(["initial.position.0=0,1"]), "grid")

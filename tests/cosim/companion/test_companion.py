@@ -193,7 +193,7 @@ NOT_STEERED = {
 }  # fmt: skip
 
 
-@pytest.mark.medium(fast=4)
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(("kind", "options", "event", "words"), NOT_STEERED.values(), ids=NOT_STEERED)
 def test_no_setpoints_are_sent_to_a_vehicle_that_cannot_be_steered(tmp_path, kind, options, event, words):
     link = StandIn(**{"profile": "generic", "shift": SHIFT} | kind)
@@ -529,7 +529,7 @@ IGNORED = "ArduSub ignores sticks of station 250: SYSID_MYGCS is 255; set its sy
 HIDES = "no failsafe while station 255 runs; it satisfies FS_GCS_ENABLE: set FS_PILOT_INPUT to 1"
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.parametrize(
     ("profile", "options", "events", "warnings"),
     [

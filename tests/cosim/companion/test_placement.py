@@ -154,7 +154,7 @@ def test_a_bottom_elsewhere_than_in_the_scene_is_shown_before_arming(tmp_path, d
     assert ("; WARNING: below " in placement) == is_warned
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.parametrize(
     "origin",
     [

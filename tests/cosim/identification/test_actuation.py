@@ -39,6 +39,7 @@ def test_wrench_matches_the_plant(vehicle):
     assert found[: len(rows)] == pytest.approx(flown[1::2], abs=2e-2)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(("lag", "is_sampled"), [(0.03, False), (0.1, True), (0.4, False)])
 def test_wrench_derivatives_match_central_differences(vehicle, lag, is_sampled):
     log = dataclasses.replace(log_of(vehicle, period=0.1 if is_sampled else 0.05), sampled=is_sampled)

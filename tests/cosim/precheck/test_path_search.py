@@ -23,6 +23,7 @@ WALL = box("wall", 3.0, (0.5, 400.0, 400.0), "out")
 GOAL = ball("goal", 6.0, 0.5)
 
 
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     ("regions", "found"),
     [

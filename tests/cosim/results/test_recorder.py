@@ -68,6 +68,7 @@ def test_a_stream_that_is_cut_anywhere_is_read_up_to_its_last_complete_batch(tmp
     assert counts == sorted(counts, reverse=True) and set(counts) == {30, 20, 10}
 
 
+@pytest.mark.medium(fast=2)
 @pytest.mark.parametrize("seed", range(5))
 def test_a_damaged_stream_is_read_or_refused(tmp_path, seed):
     record(Recorder(tmp_path, COLUMNS, batch_rows=10), 35)

@@ -93,7 +93,7 @@ def test_custom_law_flies_on_links_and_in_the_live_view_with_the_same_bits(kind,
         assert all(np.array_equal(one[name], other[name], equal_nan=True) for name in one.units)
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.parametrize("kind", KINDS)
 def test_run_of_a_custom_law_is_exported_and_streamed(kind, tmp_path, capsys):
     run = run_scenario(SCENARIO, tmp_path / "run", report=False, law=KINDS[kind]())

@@ -181,6 +181,7 @@ def test_former_names_of_loads_are_read(fmus, tmp_path, caplog):
     assert any("is now" in record.message for record in caplog.records)
 
 
+@pytest.mark.medium
 @pytest.mark.parametrize("by", ["inputs", "outputs"])
 def test_components_are_connected_with_each_other(fmus, by):
     """In the order of their connections, whatever that of the file; Jacobi's order delays each by a step."""
@@ -236,6 +237,7 @@ def test_reset_by_commands_and_steps_one_by_one(fmus):
         queue.submit(cmd.Arm(False))
 
 
+@pytest.mark.medium(fast=3)
 @pytest.mark.parametrize(
     ("mode", "words"),
     [
@@ -256,6 +258,7 @@ def test_failures_name_fmu_and_time_and_keep_the_record(fmus, fmi, tmp_path, mod
     assert list(flown.refused) == [1] and flown.outcomes[0].tobytes() == flown.outcomes[2].tobytes()
 
 
+@pytest.mark.medium(fast=6)
 @pytest.mark.parametrize(
     ("names", "maps", "words"),
     [

@@ -87,6 +87,7 @@ def test_packaged_controller_has_the_bits_of_its_law(fmi, tmp_path, name):
         np.testing.assert_allclose(outcomes[1][field], outcomes[0][field], rtol=1e-12, atol=1e-12, err_msg=field)
 
 
+@pytest.mark.medium(fast=1)
 def test_map_connects_other_names(fmus, fmi):
     """And a brake of C is the brake: a wrench of -40 times the velocity."""
     same = kept_rows(braked(fmus, fmi))
@@ -173,6 +174,7 @@ def test_check_compares_the_period_with_the_steps_of_the_fmu(fmus, tmp_path):
         Master(braked(fmus, 3, f"law.file={tmp_path}/it.fmu"))
 
 
+@pytest.mark.medium(fast=4)
 @pytest.mark.parametrize(
     ("mode", "words"),
     [

@@ -115,7 +115,7 @@ def failures(fly, family, kind, vehicle, seeds):
                 yield seed, lag, score.min_clearance, score.bound_excess, score.reached
 
 
-@pytest.mark.medium(fast=2)
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("vehicle", VEHICLES)
 @pytest.mark.parametrize("kind", FAMILIES)
 @pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 15), marks=pytest.mark.slow)], ids=["few", "many"])

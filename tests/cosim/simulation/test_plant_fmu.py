@@ -109,6 +109,7 @@ def test_run_with_report_replay_and_link(fmus, fmi, tmp_path, monkeypatch):
         assert main(["export", "run", "--to", kind, "--out", f"it.{kind}"]) == 0
 
 
+@pytest.mark.medium(fast=6)
 @pytest.mark.parametrize(
     ("plant", "changes", "words"),
     [
@@ -136,6 +137,7 @@ def test_what_does_not_fit_is_refused(fmus, plant, changes, words):
         Master(puck(fmus, 3, changes, **plant)).close()
 
 
+@pytest.mark.medium(fast=1)
 def test_failures_name_it_and_keep_the_record(fmus, fmi, tmp_path):
     given = {"mode": MODES.index("nan"), "at": 1.0, "gain": MASS}
     failing = {"position.x": 20}

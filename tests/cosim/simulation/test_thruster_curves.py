@@ -32,6 +32,7 @@ def test_a_known_curve_changes_commands_and_no_motion(tmp_path):
     assert abs(curved["thrust[8]"] - plain["thrust[8]"]).max() > 2.0
 
 
+@pytest.mark.medium
 def test_a_wrench_acts_as_commanded_on_thrusters_with_a_curve(tmp_path):
     wanted = np.array([12.0, -5.0, 3.0, 0.0, 0.0, 1.0])
     law = FunctionLaw(lambda *_: wanted)

@@ -176,6 +176,7 @@ def test_lost_frames_are_counted_and_advance_one_step(serve, caplog):
     assert [r.message for r in caplog.records] == ["4 frames of the autopilot lost: one step is made for all"]
 
 
+@pytest.mark.medium
 def test_thirty_two_channels_are_accepted(serve, tmp_path):
     path = tmp_path / "mine.toml"
     text = (resources.files("plant_fmu") / "vehicles" / "bluerov2_heavy.toml").read_text()

@@ -205,6 +205,7 @@ def test_no_array_is_both_a_variable_and_a_constant(law):
     ]
 
 
+@pytest.mark.medium(fast=3)
 @pytest.mark.parametrize(
     ("values", "said"),
     [
@@ -278,6 +279,7 @@ def test_periods_are_counted_not_summed(arbiter):
         assert arbiter.outputs.values[0] == pytest.approx(expected, abs=1e-15)
 
 
+@pytest.mark.medium
 def test_arbiter_is_the_python_one_over_random_inputs(arbiter):
     closed, rng = Arbiter(engine="closed"), np.random.default_rng(5)
     arbiter.set({"time.arbiter": STEP})

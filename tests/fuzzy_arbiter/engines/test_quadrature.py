@@ -52,7 +52,7 @@ def sampled(output, cuts, implications, points=500_000):
     return x, y
 
 
-@pytest.mark.medium(fast=1)
+@pytest.mark.medium
 @pytest.mark.parametrize("seed", range(12))
 def test_no_random_system_fails_or_is_beyond_its_bound(seed):
     """All implications, aggregations, defuzzifiers and kinds of terms; none, one, two or all rules fire."""

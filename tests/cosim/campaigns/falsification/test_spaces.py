@@ -129,7 +129,7 @@ def test_points_drawn_evenly_are_scenes_of_the_generator(family):
         assert ks_2samp(*([one[name] for one in some] for some in samples)).pvalue > 1e-3, name
 
 
-@pytest.mark.medium(fast=2)
+@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("family", ["conflict", "hard", "plain", "tour"])
 def test_scene_is_determined_by_its_point_and_valid(family):
     space, rng = SceneSpace(family), np.random.default_rng(3)
