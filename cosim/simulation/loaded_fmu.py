@@ -24,7 +24,7 @@ class LoadedFmu:
         try:
             self.plant = self._load()
         except BaseException:
-            self.close()
+            self._watchdog.close()
             raise
 
     def _load(self) -> Plant:
@@ -98,6 +98,5 @@ class LoadedFmu:
 
     def close(self) -> None:
         """Free the FMU. May be called twice."""
-        if hasattr(self, "_plant"):
-            self.plant.close()
+        self.plant.close()
         self._watchdog.close()

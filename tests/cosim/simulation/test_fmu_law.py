@@ -25,6 +25,7 @@ from cosim.results.file_copies import files_of
 from cosim.simulation.commands import commands as cmd
 from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.fmu_map import require_unit
+from cosim.simulation.loaded_fmu import LoadedFmu
 from cosim.ssp.controller import controller_component
 from plant_fmu import PlantError
 from plant_fmu.build import cached_fmu
@@ -95,6 +96,15 @@ def test_map_connects_other_names(fmus, fmi):
     for name in ("position.x", "wrench.X", "wrench.N"):
         np.testing.assert_array_equal(same[name], other[name])
     np.testing.assert_allclose(same["wrench.Z"][1:], -40.0 * same["velocity.w"][1:], rtol=1e-15)
+
+
+def test_a_closed_law_has_freed_its_fmu(fmus):
+    scenario = braked(fmus, 3)
+    loaded = LoadedFmu(scenario.law.fmu, scenario.time.control, "time.control")
+    loaded.close()
+    loaded.close()
+    with pytest.raises(PlantError, match="is closed"):
+        loaded.plant.initialize()
 
 
 def test_all_signals_that_a_law_receives_can_be_connected(fmus):
