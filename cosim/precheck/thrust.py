@@ -32,7 +32,8 @@ def thrust_findings(scenario: Scenario) -> Iterator[Finding]:
     vehicle, phi = true_vehicle(scenario), scenario.true_restoring_parameters
     quaternion, current = np.array(scenario.law.desired_quaternion), np.array(scenario.plant.current)
     margin = thrust_margin(vehicle, phi, quaternion, current)
-    against = f"the current's drag of {margin.drag:.3g} N and a net weight of {margin.excess_weight:.3g} N"
+    trim = f", a trim of {force:.3g} N" if (force := float(np.linalg.norm(vehicle.trim[:3]))) else ""
+    against = f"the current's drag of {margin.drag:.3g} N{trim} and a net weight of {margin.excess_weight:.3g} N"
     yield from _undriven_finding(scenario, vehicle)
     numbers: dict[str, float | str | None] = {
         "drag": margin.drag, "excess_weight": margin.excess_weight,

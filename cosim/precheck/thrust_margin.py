@@ -46,11 +46,16 @@ class ThrustMargin:
 def held_wrench(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array) -> Array:
     """Return the wrench that keeps a vehicle at rest in a current, (6,) [N, N m], body frame: (11) with nu = 0."""
     # Units of arguments: phi [N, N m]; current [m/s]
+    wrench: Array = drag_wrench(vehicle, quaternion, current) + regressor(quaternion) @ phi - vehicle.trim
+    return wrench
+
+
+def drag_wrench(vehicle: Vehicle, quaternion: Array, current: Array) -> Array:
+    """Return the part of it that is against the current [m/s] alone."""
     relative = np.zeros(6)
     relative[:3] = -rotation_matrix(quaternion).T @ current
     drag = damping(np.array(vehicle.linear_damping), np.array(vehicle.quadratic_damping), relative) * relative
-    turning = coriolis(np.array(vehicle.added_mass), relative) @ relative
-    wrench: Array = turning + drag + regressor(quaternion) @ phi - vehicle.trim
+    wrench: Array = coriolis(np.array(vehicle.added_mass), relative) @ relative + drag
     return wrench
 
 
@@ -62,7 +67,7 @@ def thrust_margin(vehicle: Vehicle, phi: Array, quaternion: Array, current: Arra
     *without, left = least_margins(vehicle, quaternion, hold, ~np.eye(n + 1, n, dtype=bool))
     return ThrustMargin(
         hold=tuple(hold.tolist()),
-        drag=float(np.linalg.norm((held_wrench(vehicle, np.zeros(4), quaternion, current) + vehicle.trim)[:3])),
+        drag=float(np.linalg.norm(drag_wrench(vehicle, quaternion, current)[:3])),
         excess_weight=float(phi[0]),
         thrust=least_margins(vehicle, quaternion, np.zeros(6), np.ones((1, n)))[0],
         left=left,

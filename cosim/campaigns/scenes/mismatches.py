@@ -24,7 +24,7 @@ from cosim.campaigns.scenes.scene_tables import (
 )  # fmt: skip
 from cosim.campaigns.scenes.trials import hard_region, obstacle
 from cosim.precheck.path_search import find_path
-from cosim.precheck.thrust_margin import held_wrench, least_margins
+from cosim.precheck.thrust_margin import drag_wrench, least_margins
 from cosim.scenario.scenario import Scenario, validate_scenario
 from cosim.scenario.true_vehicle import true_vehicle
 from plant_fmu.vehicle import Vehicle, load_vehicle
@@ -81,7 +81,7 @@ def is_admitted(scenario: Scenario) -> bool:
         speed = float(np.linalg.norm(current))
         gust = _GUSTS * over.get("current_variation.x", 0.0)
         current = current * (1.0 + gust / speed) if speed > 0.0 else np.array([gust, 0.0, 0.0])
-        needed = max(needed, float(np.linalg.norm(held_wrench(vehicle, np.zeros(4), level, current)[:3])))
+        needed = max(needed, float(np.linalg.norm(drag_wrench(vehicle, level, current)[:3])))
     if thrust is None or thrust.force < _RESERVE * (abs(vehicle.weight - vehicle.buoyancy) + needed):
         return False
     regions = [secondary.region for secondary in scenario.regions]

@@ -1,5 +1,6 @@
 """Thrust in each direction, against values derived by hand from the ODIN-like vehicle."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -43,6 +44,13 @@ def test_current_reduces_the_margin_by_its_drag():
     assert m.hold == pytest.approx([-7.68, 0.0, 2.0, 0.0, 0.0, 0.0])
     assert m.left.direction.startswith("south-")
     assert m.left.force == pytest.approx(54.0 - 7.68 / math.sqrt(2.0))
+
+
+def test_trim_is_held_as_the_drag_of_a_current_is():
+    pulled = dataclasses.replace(ODIN, trim=np.array([7.68, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    m = margin(STILL, vehicle=pulled)
+    assert m.drag == 0.0 and m.hold == pytest.approx([-7.68, 0.0, 2.0, 0.0, 0.0, 0.0])
+    assert m.left.force == pytest.approx(margin([0.4, 0.0, 0.0]).left.force)
 
 
 def test_weight_narrows_the_vertical():
