@@ -6,7 +6,7 @@
 The state x is position and velocity. f knows mass, added mass and drag; an observer adds the acceleration that they do
 not explain, such as by weight or current. Region i is its tangent plane where the plan before is nearest to it at stage
 k; p_d is the point of the goal region nearest to the vehicle, `inset` within it, and m the moment that a PD controller
-wants for the attitude. It looks no further than its horizon, so that it may wait behind a wall for ever. As a script it
+wants for the attitude. It looks no further than its horizon, so that it may wait behind a wall forever. As a script it
 writes the folder runs/mpc.
 
     pip install ./fuzzy_arbiter '.[mpc]'
@@ -91,17 +91,17 @@ class PredictiveLaw(CompiledLaw):
         if self.steps == 0 or np.isnan(self.position).any():
             self.position, self.velocity = state.position.copy(), measured
             return
-        v, car = np.concatenate([R.T @ self.velocity[:3], self.velocity[3:]]), self.vehicle
-        drag = (car.linear_damping + car.quadratic_damping * np.abs(v)) * v
-        a = (car.thruster_matrix @ self.thrusts - drag) / self.mass
+        v, vehicle = np.concatenate([R.T @ self.velocity[:3], self.velocity[3:]]), self.vehicle
+        drag = (vehicle.linear_damping + vehicle.quadratic_damping * np.abs(v)) * v
+        a = (vehicle.thruster_matrix @ self.thrusts - drag) / self.mass
         a[:3] = R @ a[:3]
         self.position += period * self.velocity[:3]
         self.velocity += period * (a + self.unknown)
         if known:
-            z, e = 1.0 / (1.0 + self.gains.observer * period), measured - self.velocity
-            self.position += (1.0 - z) * (state.position - self.position)
-            self.velocity += (1.0 - z * z) * e
-            self.unknown += (1.0 - z) ** 2 / period * e
+            pole, innovation = 1.0 / (1.0 + self.gains.observer * period), measured - self.velocity
+            self.position += (1.0 - pole) * (state.position - self.position)
+            self.velocity += (1.0 - pole**2) * innovation
+            self.unknown += (1.0 - pole) ** 2 / period * innovation
 
     def _replan(self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, R: np.ndarray) -> None:
         N, width, m, gains = self.N, self.width, self.n_forces, self.gains
@@ -129,9 +129,9 @@ class PredictiveLaw(CompiledLaw):
         rows = 6 + self.n_regions
         lower, upper = np.zeros((N, rows)), np.zeros((N, rows))
         upper[:, 6:] = np.inf
-        found = self.solver(x0=self.plan, p=p, lbx=low, ubx=high, lbg=lower.ravel(), ubg=upper.ravel())["x"]
+        solution = self.solver(x0=self.plan, p=p, lbx=low, ubx=high, lbg=lower.ravel(), ubg=upper.ravel())["x"]
         if self.solver.stats()["success"]:  # else the plan before goes on
-            self.plan = np.clip(found.full().ravel(), low, high)
+            self.plan = np.clip(solution.full().ravel(), low, high)
 
 
 def _clearance(regions: PackedRegions, i: int, place: np.ndarray, normal: np.ndarray) -> float:

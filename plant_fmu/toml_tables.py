@@ -21,7 +21,7 @@ MAX_FILE = 4_000_000  # maximum number of bytes of a file; the longest in the pa
 MAX_DEPTH = 20  # maximum number of levels of nested tables and lists
 MAX_DIGITS = 400  # maximum number of digits of a whole number, more than any float has
 
-_MAX_COMPARED = 100  # maximum number of characters of a name that are compared with known names
+MAX_COMPARED = 100  # maximum number of characters of a name that are compared with known names
 
 _MAX_LISTED = 30  # maximum number of names that a message lists
 
@@ -100,8 +100,8 @@ def require(ok: bool, key: str, received: object, expected: str) -> None:
 
 def hint(received: str, known: typing.Iterable[str]) -> str:
     """Format a hint for an unknown name: the nearest known one, else a list of all."""
-    known, received = sorted(known), received[:_MAX_COMPARED]  # a comparison takes time with the square of the length
-    matches = difflib.get_close_matches(received[:100], known, n=1, cutoff=0.5)
+    known, received = sorted(known), received[:MAX_COMPARED]  # a comparison takes time with the square of the length
+    matches = difflib.get_close_matches(received, known, n=1, cutoff=0.5)
     if matches:
         return f"did you mean {matches[0]!r}?"
     listed = ", ".join(known) if len(known) <= _MAX_LISTED else f"{len(known)} names, such as {', '.join(known[:3])}"

@@ -19,6 +19,11 @@ if TYPE_CHECKING:
     from cosim.results.run_result import Run
 
 
+_OF_SCENARIOS = (
+    "law", "rate", "replay_commands", "live", "mavlink", "commands", "await_arm", "signing_key", "allow_system",
+)  # fmt: skip -- flags that a system of FMUs has not
+
+
 def add_verbs(verbs: Any) -> None:
     """Add the verb to the subparsers of the command."""
     verb = add_verb(
@@ -79,18 +84,7 @@ def _run_system(options: argparse.Namespace) -> int:
     from cosim.results.record import RECORD
     from cosim.run.run_system import run_system
 
-    others = [
-        "law",
-        "rate",
-        "replay_commands",
-        "live",
-        "mavlink",
-        "commands",
-        "await_arm",
-        "signing_key",
-        "allow_system",
-    ]
-    refuse_flags(options, others, "a scenario with it: a system of FMUs runs alone")
+    refuse_flags(options, _OF_SCENARIOS, "a scenario with it: a system of FMUs runs alone")
     folder, summary = run_system(Path(options.scenario), options.out, options.set)
     if options.json:
         print(json_text({"folder": str(folder), "summary": summary}), end="")

@@ -17,6 +17,7 @@ from cosim.io.strict_json import json_text
 from cosim.results.record import Rows
 from cosim.results.run_result import SCENARIO, Run, load_run
 from cosim.simulation.signals import Column
+from plant_fmu.toml_tables import MAX_COMPARED
 
 _ROUNDING = 1e-6  # periods, tolerance of the comparison of times and ticks
 
@@ -85,6 +86,6 @@ def _match_names(pattern: str, names: Sequence[str]) -> list[str]:
     # exact names first: in a pattern, the brackets of thrust[1] would be a character class
     matching = [name for name in names if name == pattern] or [name for name in names if fnmatchcase(name, pattern)]
     if not matching:
-        near = difflib.get_close_matches(pattern[:100], names, n=3, cutoff=0.0)
+        near = difflib.get_close_matches(pattern[:MAX_COMPARED], names, n=3, cutoff=0.0)
         raise ExportError(f"--signals {pattern}: fits no signal of the run; expected such as {', '.join(near)}")
     return matching

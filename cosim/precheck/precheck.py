@@ -73,15 +73,15 @@ def check_scenario(scenario: Scenario | str | Path) -> Check:
     (38) 1, 2
     """
     scenario = to_scenario(scenario)
-    by_paper = scenario.law.name == "ismail_dunnigan"
-    findings = [finding for finding in vehicle_findings(scenario) if by_paper or finding.status == "fails"]
+    is_papers = scenario.law.name == "ismail_dunnigan"
+    findings = [finding for finding in vehicle_findings(scenario) if is_papers or finding.status == "fails"]
     findings += [*angle_findings(scenario), *region_findings(scenario), *thrust_findings(scenario)]
-    if by_paper:
+    if is_papers:
         weights = start_weights(scenario)
         findings += [*gain_findings(scenario, weights), initial_force_finding(scenario, weights)]
     elif scenario.law.fmu:
         findings += law_fmu_findings(scenario, scenario.law.fmu)
     elif text := foreign_gains(scenario):
-        findings.append(Finding("law", "gains", "fails", f"The {text}.", "Find gains for this vehicle: " + FIND_GAINS))
+        findings.append(Finding("law", "gains", "fails", f"The {text}.", f"{FIND_GAINS.capitalize()}."))
     findings += component_findings(scenario)
     return Check(scenario.name, scenario.title, scenario.law.name, scenario.vehicle.name, tuple(findings))

@@ -30,6 +30,7 @@ if TYPE_CHECKING:  # pymavlink and websockets are imported only for runs that ne
     from cosim.mavlink.thread import LinkThread
     from cosim.report.figure_process import FigureProcess
 
+_LOG = logging.getLogger(__name__)
 _PROGRESS_STEPS = 200  # updates of the bar
 
 
@@ -146,7 +147,7 @@ def run_scenario(
     elif given is not None:
         scenario = with_custom_law(given, scenario)
     if text := foreign_gains(scenario):
-        logging.getLogger("cosim").warning("%s: %s", text, FIND_GAINS)
+        _LOG.warning("%s: %s", text, FIND_GAINS)
     replayed = None if commands_log is None else _replayed_commands(scenario, Path(commands_log))
     queue = CommandQueue()
     link: LinkThread | None = None

@@ -17,7 +17,7 @@ from controller.regions.shapes import ENTRIES
 from cosim.scenario.goal_mission import GoalMotion
 from cosim.scenario.tables import File
 from plant_fmu.errors import PlantFmuError
-from plant_fmu.toml_tables import Table, fields_of, table_in, types_in
+from plant_fmu.toml_tables import MAX_COMPARED, Table, fields_of, table_in, types_in
 from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
@@ -86,16 +86,15 @@ _MAX_PROPOSED = 3
 
 def hint_of_key(name: str, vehicle: object) -> str:
     """Format a hint for an unknown key of a file: the nearest one, or those in its tables that resemble it."""
-    if near := difflib.get_close_matches(name[:100], File.__struct_fields__, n=1, cutoff=_CLOSE):
+    name = name[:MAX_COMPARED]
+    if near := difflib.get_close_matches(name, File.__struct_fields__, n=1, cutoff=_CLOSE):
         return f"did you mean {near[0]!r}?"
     keys = {key.replace("[]", "") for key in KEYS}
     if isinstance(vehicle, str):
         with contextlib.suppress(PlantFmuError):
             names = (v.name for v in variables(load_vehicle(vehicle)) if v.role == "parameter")
             keys |= {f"plant.parameters.{name.partition('[')[0]}" for name in names}
-    similarity = {
-        key: difflib.SequenceMatcher(None, name[:100], key.rpartition(".")[2]).ratio() for key in sorted(keys)
-    }
+    similarity = {key: difflib.SequenceMatcher(None, name, key.rpartition(".")[2]).ratio() for key in sorted(keys)}
     near = [key for key in sorted(similarity, key=similarity.__getitem__, reverse=True) if similarity[key] >= _SIMILAR]
     return (
         f"did you mean {' or '.join(near[:_MAX_PROPOSED])}?"

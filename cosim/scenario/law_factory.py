@@ -27,7 +27,7 @@ from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.toml_tables import hint
 
 _SOURCE = re.compile(r"(.+\.py):([^\W\d]\w*)", re.S)
-FIND_GAINS = "cosim sweep, as in docs/baselines.md#gains-for-another-vehicle, and set law.gains."
+FIND_GAINS = "find others by cosim sweep, see docs/baselines.md#gains-for-another-vehicle"
 _DIGEST = "__digest__"  # attribute of the module of a file: its SHA-256
 
 

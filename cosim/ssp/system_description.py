@@ -187,9 +187,8 @@ class _Reader:
 
     def _pair(self, attributes: Mapping[str, str]) -> tuple[float, float]:
         """Return factor and offset of a linear transformation or a base unit."""
-        return self._number("factor", attributes.get("factor", "1")), self._number(
-            "offset", attributes.get("offset", "0")
-        )
+        factor, offset = attributes.get("factor", "1"), attributes.get("offset", "0")
+        return self._number("factor", factor), self._number("offset", offset)
 
     # ---- parameters ----
 

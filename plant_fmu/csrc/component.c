@@ -136,7 +136,8 @@ static bool valid_state(const Model *m)
         valid = valid && fabs(m->held.samples[i]) < 1e15;
     for (int i = 0; i < N_SENSORS; i++) {
         const double pending = m->held.pending[i];
-        valid = valid && (m->held.ticked[i] | 1) == 1 && m->held.delivered[i] >= 0.0 && m->held.delivered[i] < 1e15 && fabs(m->held.sample_time[i]) <= MAX_TIME &&
+        valid = valid && (m->held.ticked[i] == 0 || m->held.ticked[i] == 1) &&
+                m->held.delivered[i] >= 0.0 && m->held.delivered[i] < 1e15 && fabs(m->held.sample_time[i]) <= MAX_TIME &&
                pending >= 0.0 && pending <= MAX_PENDING;
         for (int j = 0; valid && j < (int)pending; j++) {
             const Pending *sample = &m->held.queue[i][j];

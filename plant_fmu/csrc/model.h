@@ -99,8 +99,7 @@ int model_shows_sample(const Model *model, int channel);
 int model_apply_unlagged(Model *model);
 
 /* Integrates to the time `end`, with whole substeps from tick to tick; if `stops`, at most until a sample is delivered.
- * Returns 0 if a substep is unstable, and writes its
- * length [s] to `failed`; the model is then left where it failed. */
+ * Returns 0 if a substep is unstable, and writes its length [s] to `failed`; the model is then left where it failed. */
 int model_advance(Model *model, double end, int stops, double *failed);
 
 /* Writes the exact directional derivative of state and outputs to `tangent`, along the parameters, state, inputs and time in

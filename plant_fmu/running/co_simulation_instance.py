@@ -22,6 +22,7 @@ from plant_fmu.running.messages import WARNING
 from plant_fmu.running.native import Native, stops_early
 from plant_fmu.running.state import Clock
 from plant_fmu.running.values import Value, convert_value, convert_values, require_settable
+from plant_fmu.toml_tables import MAX_COMPARED
 from plant_fmu.variables.former_names import present_name
 
 _MAX_STEP = 1e9  # s, bound of a step
@@ -141,7 +142,7 @@ class CoSimulationInstance:
         known = self._instance.variables
         name = present_name(name, known)
         if name not in known:
-            matches = difflib.get_close_matches(str(name)[:100], known, n=1)
+            matches = difflib.get_close_matches(str(name)[:MAX_COMPARED], known, n=1)
             suggestion = (
                 f"did you mean {matches[0]!r}?" if matches else f"expected one of the {len(known)} in plant.names"
             )

@@ -32,10 +32,10 @@ def path_of(**choices):
 @functools.cache
 def elements():
     """Return the scalars of each array, and of each other variable itself, by name."""
-    found = {}
+    by_array = {}
     for v in with_arrays(variables(load_vehicle("odin"))):
-        found.setdefault(v.array if v.size != 1 else v.name, []).append(v.name)
-    return {name: names for name, names in found.items() if not name.endswith(".clock")}
+        by_array.setdefault(v.array if v.size != 1 else v.name, []).append(v.name)
+    return {name: names for name, names in by_array.items() if not name.endswith(".clock")}
 
 
 def as_arrays(fmu, values):

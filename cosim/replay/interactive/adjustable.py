@@ -56,10 +56,8 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | 
     shapes += [(f"regions.{i}.shape", r.region.shape, data.regions, i) for i, r in enumerate(scenario.regions)]
     for path, shape, packed, i in shapes:
         positions, first = list(_positions(path, shape)), memory.keep(packed.numbers) + int(packed.offsets[i])
-        if scenario.mission.uses_features and isinstance(
-            shape, Visibility
-        ):  # the mission looks at its feature, or moves it
-            positions = []
+        if scenario.mission.uses_features and isinstance(shape, Visibility):
+            positions = []  # the mission looks at its feature, or moves it
         # of a goal without a point for its center, the page does not know the shifts to its next positions
         if not positions or (path == "goal" and scenario.goal_then and not has_center):
             moves.append(None)

@@ -1,7 +1,6 @@
 """FMUs beside the plant: against a master of FMPy's slaves, in runs and in flights without a record; each failure."""
 
 import contextlib
-import functools
 import importlib
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
-from cosim import Master, check_scenario, load_run, load_scenario, run_scenario
+from cosim import Master, check_scenario, load_run, run_scenario
 from cosim.batch.fused import FusedFlyer
 from cosim.batch.variation import Variation
 from cosim.command_line.cli import main
@@ -19,62 +18,14 @@ from cosim.simulation.commands.sources import CommandQueue
 from plant_fmu import PlantError, load_vehicle
 from plant_fmu.build import cached_fmu
 from plant_fmu.vehicle_component import make_vehicle_component
+from tests.cosim.components import CURRENT, FORCE, POSITION, beside, build_fmu, numbered, short
 from tests.cosim.simulation.keep import kept_rows
 from tests.foreign_fmu import MODES, build_foreign_fmu
-
-TIMES = ["time.duration=3", "time.step=0.01", "time.control=0.01", "time.arbiter=0.01", "arbiter.engine=closed"]
-POSITION, FORCE = ([f"{name}.{axis}" for axis in "xyz"] for name in ("position", "load.world.force"))
-CURRENT = ["current_input.x", "current_input.y"]
-UNITS = dict.fromkeys(POSITION, "m") | dict.fromkeys(FORCE, "N") | dict.fromkeys(CURRENT, "m/s")
-
-
-def numbered(names, first):
-    return {name: first + i for i, name in enumerate(names)}
-
-
-def build_fmu(folder, fmi, name, **names):
-    build_foreign_fmu(folder / f"{name}{fmi}.fmu", fmi, **names)
-
-
-def short(names):
-    """Return other names for variables, such as ``force_x``."""
-    return [name.rpartition("world.")[2].replace(".", "_") for name in names]
 
 
 @pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
 def fmi(request):
     return request.param
-
-
-@pytest.fixture(scope="module")
-def fmus(once):
-    """Return the folder with tethers, currents and gains: with names of their own, and with those of signals."""
-
-    def make(folder):
-        for fmi in (2, 3):
-            build = functools.partial(build_fmu, folder, fmi)
-            build("tether", inputs=numbered(POSITION, 10), outputs=numbered(FORCE, 20), units=tuple(UNITS.items()))
-            build("line", inputs=numbered(short(POSITION), 10), outputs=numbered(short(FORCE), 20))
-            build("current", inputs={"position.z": 10}, outputs=numbered(CURRENT, 20), units=tuple(UNITS.items()))
-            build("gain", inputs={"u": 10}, outputs={"y": 20}, units=(("u", "m"), ("y", "m")))
-
-    return once("components", make)
-
-
-def beside(fmus, fmi, *names, changes=(), **maps):
-    """Return the paper's scenario with components, which have the names and modes of their files."""
-    table = {
-        "tether": {"mode": MODES.index("tether"), "gain": 200.0},
-        "line": {"mode": MODES.index("tether"), "gain": 200.0},
-        "current": {"mode": MODES.index("current"), "gain": 0.3},
-    }
-    entries = []
-    for name in names:
-        file, _, own = name.partition(":")
-        entry = {"name": own or file, "file": str(fmus / f"{file}{fmi}.fmu"), "parameters": table.get(file, {})}
-        entries.append(entry | maps.get(own or file, {}))
-    scenario = load_scenario("paper", [*TIMES, "law.name=pd", *changes])
-    return scenario.replace({"components": entries})
 
 
 class Slave:

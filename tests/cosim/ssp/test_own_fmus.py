@@ -12,8 +12,8 @@ from cosim.run.run_system import run_system
 from cosim.ssp import controller_component, package_system
 from cosim.ssp.system import MOTION
 from plant_fmu.build import cached_fmu
+from tests.cosim.components import beside
 from tests.cosim.simulation.keep import kept_rows
-from tests.cosim.simulation.test_components import beside, fmus  # noqa: F401 -- a fixture
 from tests.cosim.ssp.masters import fmpy as run_in_fmpy
 from tests.cosim.ssp.test_system import TEN_MS
 
@@ -45,7 +45,7 @@ def test_a_law_that_is_an_fmu(name, tmp_path):
 
 
 @pytest.mark.medium
-def test_components(fmus, tmp_path):  # noqa: F811
+def test_components(fmus, tmp_path):
     """A tether that receives positions and sets forces, a current, and a gain between other FMUs."""
     gain = {"inputs": {"u": "goal.clearance"}, "parameters": {"gain": 2.0}}
     changes = ["law.name=ismail_dunnigan", "time.duration=2"]

@@ -42,8 +42,8 @@ def test_a_scenario_as_a_system_and_as_one_fmu_has_the_bits_of_its_run(tmp_path,
     monkeypatch.setitem(sys.modules, "fmu_manipulation_toolbox.container", None)
     monkeypatch.setitem(sys.modules, "fmu_manipulation_toolbox", None)
     assert main(["export", "paper.ssp", "--to", "fmu", "--out", "none.fmu"]) == 2
-    said = capsys.readouterr().err
-    assert "the extra container" in said and "pip install" in said and said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert "the extra container" in message and "pip install" in message and message.count("\n") == 1
 
 
 # ---- systems of others ----
@@ -141,8 +141,8 @@ def test_what_is_not_supported_is_refused_by_name(gain, tmp_path, capsys, monkey
     assert ssd != SSD
     write_system(tmp_path / "two.ssp", gain, ssd)
     assert main(["run", "two.ssp", "--set", *STEP, "--out", "run"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and words in said and not (tmp_path / "run").exists()
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1 and words in message and not (tmp_path / "run").exists()
 
 
 @pytest.mark.medium
@@ -152,8 +152,8 @@ def test_a_failure_names_fmu_and_time_and_keeps_the_record(gain, tmp_path, capsy
     ssv = SSV.replace('first.mode"><s:Real value="0"', f'first.mode"><s:Real value="{MODES.index(mode)}"')
     write_system(tmp_path / "two.ssp", gain, ssv=ssv)
     assert main(["run", "two.ssp", "--set", *STEP, "--out", "run"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "first (first.fmu)" in said and words in said
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1 and "first (first.fmu)" in message and words in message
     assert len(pq.read_table("run/record.parquet")) == 3
     assert '"failed: first' in (tmp_path / "run" / "summary.json").read_text()
 
