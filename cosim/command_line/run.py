@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from cosim.results.run_result import Run
 
 
+# flags that a system of FMUs has not
 _OF_SCENARIOS = (
     "law", "rate", "replay_commands", "live", "mavlink", "commands", "await_arm", "signing_key", "allow_system",
-)  # fmt: skip -- flags that a system of FMUs has not
+)  # fmt: skip
 
 
 def add_verbs(verbs: Any) -> None:
