@@ -182,11 +182,6 @@ class Mission:
         return [(leg, key) for leg, key in zip(self.legs, self.keys, strict=True) if leg.pace == 0.0][1:]
 
     @property
-    def glides(self) -> bool:
-        """True if the goal moves along a way."""
-        return any(leg.pace > 0.0 for leg in self.legs)
-
-    @property
     def turns(self) -> bool:
         """True if a leg has its own heading."""
         return any(leg.faces or math.isfinite(leg.heading) for leg in self.legs)
