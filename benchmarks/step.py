@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +17,14 @@ from cosim.results.recorder import Recorder
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 from cosim.simulation.signals import Array
+from cosim.ssp import controller_component
 from cosim.step.decision import arbitrate, control
 from cosim.step.one_step import locate
+from plant_fmu.build import cached_fmu
 
 STEPS = 20_000
 RATIO = "how many times as long as the plant's step"
+_CLOSED = "arbiter.engine=closed"
 _SLOWER = 50  # divisor of the calls of slower parts
 
 
@@ -32,7 +36,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
     def add_calls(name: str, work: Callable[[], object], calls: int = steps) -> None:
         timings[name] = time_calls(work, calls, repeats)
 
-    with Master(load_scenario("paper", ["arbiter.engine=closed"])) as master:
+    with Master(load_scenario("paper", [_CLOSED])) as master:
         fmu = f"FMU: set {len(master.plant.inputs)}, step, get {len(master.plant.outputs)}"
         add_calls(fmu, lambda: master.plant.step(1e-3))
         add_calls(f"FMU: {len(master.plant.flags)} flags", master.plant.read_flags)
@@ -55,6 +59,11 @@ def measure(steps: int, repeats: int) -> list[Row]:
     for record in (False, True):
         how = "with record" if record else "no record"
         timings[f"whole step, closed form, {how}"] = _whole("closed", steps, repeats, record=record)
+    with tempfile.TemporaryDirectory() as folder:
+        law = shutil.copy(cached_fmu(controller_component(load_scenario("paper", [_CLOSED])), 3), f"{folder}/law.fmu")
+        timings["whole step, closed form, no record, the law as an FMU"] = _whole(
+            "closed", steps, repeats, record=False, changes=[f"law.file={law}"]
+        )
     timings["whole step, scikit-fuzzy, with record"] = _whole("skfuzzy", steps, repeats, record=True)
     return with_base(timings)
 
@@ -65,9 +74,9 @@ def _law_alone(master: Master) -> Callable[[], None]:
     return lambda: master.law.step(data.state, data.goal, data.regions, weights, forces)
 
 
-def _whole(engine: str, steps: int, repeats: int, *, record: bool) -> Timing:
+def _whole(engine: str, steps: int, repeats: int, *, record: bool, changes: Sequence[str] = ()) -> Timing:
     """Time whole runs by `Master.run`, as in `cosim run`; return the time of a step."""
-    scenario = load_scenario("paper", [f"arbiter.engine={engine}", f"time.duration={steps / 1000}"])
+    scenario = load_scenario("paper", [f"arbiter.engine={engine}", f"time.duration={steps / 1000}", *changes])
     times = []
     for _ in range(repeats):
         with tempfile.TemporaryDirectory() as folder, Master(scenario) as master:
