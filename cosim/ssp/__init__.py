@@ -1,6 +1,7 @@
-"""A scenario as a system of FMUs.
+"""Systems of FMUs, as SSP files.
 
-Plant, controller and arbiter as three FMUs in one SSP 1.0 file, which other masters run without Python.
+Write a scenario as one that other masters run without Python: plant, controller, arbiter, and FMUs of the user's. Read
+and step any such file, or write it as one FMU.
 
 Imports: controller, fuzzy_arbiter, plant_fmu, results, scenario, simulation, step.
 """
