@@ -146,7 +146,8 @@ def read_law(source: str) -> OwnLaw:
     module = _import_file(source, path, digest)
     definition = getattr(module, match[2], None)
     if not (_is_law(definition) or callable(definition)):
-        known = [name for name, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__]
+        own = (name for name, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__)
+        known = [name for name in own if not name.startswith("_")]
         raise RunError(f"law {source}: {match[2]} is no law or function there; {hint(match[2], known)}")
     return OwnLaw(f"{path.name}:{match[2]}", f"{path}:{match[2]}", digest, definition)
 
