@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim.companion.companion_options import CompanionOptions
 from cosim.companion.set_points import LevelLead, TurnLead, VelocityLead, make_attitude_message, make_velocity_target
-from cosim.companion.sticks import make_manual_control, make_stick_scale, override_channels, release_channels
+from cosim.companion.sticks import make_manual_control, make_stick_scale, override_channels
 from cosim.companion.vehicle_state import ReportedState
 from cosim.errors import RunError
 from cosim.mavlink.vehicle.profile import PROFILES, Profile
@@ -119,7 +119,7 @@ class Output:
             return (self._sticks(state),)
         if self._overridden:
             self._overridden = False
-            return (release_channels(self._mavlink, state.system or 0),)
+            return (override_channels(self._mavlink, state.system or 0, None),)
         return ()
 
     @property

@@ -168,15 +168,7 @@ def make_manual_control(mavlink: Any, system: int, profile: Profile, sticks: Arr
     return message
 
 
-def override_channels(mavlink: Any, system: int, sticks: Array) -> Any:
-    """Return RC_CHANNELS_OVERRIDE for sticks of X Y Z K M N, shape (6,)."""
-    return _override(mavlink, system, [round(pulse) for pulse in channel_pulses(sticks.tolist())])
-
-
-def release_channels(mavlink: Any, system: int) -> Any:
-    """Return RC_CHANNELS_OVERRIDE that releases the channels to the radio."""
-    return _override(mavlink, system, [_RELEASED] * _AXES)
-
-
-def _override(mavlink: Any, system: int, pulses: list[int]) -> Any:
+def override_channels(mavlink: Any, system: int, sticks: Array | None) -> Any:
+    """Return RC_CHANNELS_OVERRIDE for sticks of X Y Z K M N, shape (6,); None releases the channels to the radio."""
+    pulses = [_RELEASED] * _AXES if sticks is None else map(round, channel_pulses(sticks.tolist()))
     return mavlink.MAVLink_rc_channels_override_message(system, 1, *pulses, _LEFT_ALONE, _LEFT_ALONE)

@@ -118,20 +118,13 @@ class Autopilot:
             streams.advance(self._clock_us)
 
     def receive(self, link: Link, message: Any, now: float) -> None:
-        """Pass a message to its handler, if it comes from an allowed system and targets this vehicle; now [s]."""
-        context = self._context
-        context.now = now
+        """Pass a message to its handler, if it targets the autopilot, or all components; now [s]."""
+        # Its sender is allowed, and it targets this system: the link's filter has rejected all others.
+        self._context.now = now
         handler = self._handlers.get(message.get_type())
-        if handler is None or link not in self._streams:
-            return
-        sender = Sender(link, message.get_srcSystem(), message.get_srcComponent())
-        own = context.options.system_id, COMPONENT_ID
-        allowed = context.options.allowed_systems
-        if (sender.system, sender.component) == own or (allowed is not None and sender.system not in allowed):
-            return
-        system, component = getattr(message, "target_system", 0), getattr(message, "target_component", 0)
-        if system in (0, own[0]) and component in (0, own[1]):
-            handler(sender, message)
+        is_for_us = getattr(message, "target_component", 0) in (0, COMPONENT_ID)
+        if handler is not None and is_for_us and link in self._streams:
+            handler(Sender(link, message.get_srcSystem(), message.get_srcComponent()), message)
 
     def tick(self, now: float) -> None:
         """Run timeouts and streams of the wall clock; call it at least every 20 ms; now [s]."""

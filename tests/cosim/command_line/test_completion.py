@@ -33,20 +33,14 @@ _COMPLETE = {
 @pytest.mark.parametrize(
     ("words", "last", "expected"),
     [
-        ("cosim", "ca", {"campaign"}),
-        ("cosim run", "paper-l", {"paper-limited"}),
-        ("cosim run", "mi", {"mine.toml"}),
-        ("cosim run", "sce", {"scenes"}),
-        ("cosim run --set x", "dock", {"docking"}),
-        ("cosim run --profile", "a", {"ardusub"}),
-        ("cosim export --to ssp", "paper-l", {"paper-limited"}),
-        ("cosim sweep paper", "--sche", {"--scheduler"}),
-        ("cosim mavlink", "li", {"listen"}),
-        ("cosim mavlink stream", "--allow-s", {"--allow-system"}),
-        ("cosim help", "sw", {"sweep"}),
+        ("cosim", "ca", {"campaign"}), ("cosim run", "paper-l", {"paper-limited"}), ("cosim run", "mi", {"mine.toml"}),
+        ("cosim run", "sce", {"scenes"}), ("cosim run --set x", "dock", {"docking"}),
+        ("cosim run --profile", "a", {"ardusub"}), ("cosim export --to ssp", "paper-l", {"paper-limited"}),
+        ("cosim sweep paper", "--sche", {"--scheduler"}), ("cosim mavlink", "li", {"listen"}),
+        ("cosim mavlink stream", "--allow-s", {"--allow-system"}), ("cosim help", "sw", {"sweep"}),
         ("cosim help --completion", "f", {"fish"}),
     ],
-)
+)  # fmt: skip
 def test_shells_complete_verbs_flags_scenarios_and_files(name, words, last, expected, script, tmp_path):
     (tmp_path / "mine.toml").touch()
     (tmp_path / "mine.txt").touch()

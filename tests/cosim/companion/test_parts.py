@@ -23,7 +23,7 @@ from cosim.companion.pilot_watch import PilotWatch
 from cosim.companion.safety import CONDITIONS, Observation, Supervisor
 from cosim.companion.session import AutopilotSession
 from cosim.companion.set_points import TurnLead, VelocityLead, make_attitude_message, make_velocity_target
-from cosim.companion.sticks import make_manual_control, make_stick_scale, override_channels, release_channels
+from cosim.companion.sticks import make_manual_control, make_stick_scale, override_channels
 from cosim.companion.vehicle_state import ReportedState, requested_rates
 from cosim.errors import RunError
 from cosim.mavlink.vehicle.ardusub_sticks import MotorMixer
@@ -126,13 +126,8 @@ def test_zero_latitude_and_longitude_are_a_position_of_an_absolute_estimate():
 def test_an_origin_is_lost_when_the_autopilot_restarts():
     state = reported((0.0, 0.0, 0.0))
     for boot, place, has_origin in (
-        (90, 5, True),
-        (91, 5, True),
-        (1, 0, False),
-        (2, 0, False),
-        (3, 5, True),
-        (1, 5, True),
-    ):
+        (90, 5, True), (91, 5, True), (1, 0, False), (2, 0, False), (3, 5, True), (1, 5, True),
+    ):  # fmt: skip
         state.receive(1, 1, message("GLOBAL_POSITION_INT", time_boot_ms=1000 * boot, lat=place, lon=place), 0.0)
         assert state.has_origin == has_origin and (state.global_position is not None) == has_origin
 
@@ -240,7 +235,7 @@ def test_rc_override_follows_the_ardusub_order_and_zero_releases():
     for sent, first in (
         (override_channels(mavlink, 1, np.array([1.0, -1.0, 0.5, 0.25, -0.25, 0.1])),
          [1400, 1600, 1300, 1540, 1900, 1100]),  # pitch roll up yaw ahead right
-        (release_channels(mavlink, 1), [0] * 6),
+        (override_channels(mavlink, 1, None), [0] * 6),
     ):  # fmt: skip
         assert [getattr(decoded(sent), f"chan{i}_raw") for i in range(1, 9)] == [*first, 0xFFFF, 0xFFFF]
 
@@ -404,11 +399,9 @@ def dived(texts=(), clearance=None, armed_first=False):
     [
         (["EKF3 IMU0 MAG0 in-flight yaw alignment complete"], None, False, 1.6, 7.0),
         ((), None, False, 1.6, 9.0),  # an older one says nothing
-        ((), None, True, 1.0, 0.0),
-        ((), 1.5, False, 1.0, 0.0),
-        ((), 2.0, False, 1.6, 9.0),
+        ((), None, True, 1.0, 0.0), ((), 1.5, False, 1.0, 0.0), ((), 2.0, False, 1.6, 9.0),
     ],
-)
+)  # fmt: skip
 def test_an_ardusub_dives_until_its_heading_is_aligned(texts, clearance, armed_first, depth, seconds, caplog):
     """Unless it was armed before, or a hard region is near below."""
     _, state, since = dived(texts, clearance and (lambda position: clearance - position[2]), armed_first)
@@ -570,11 +563,6 @@ def test_an_ardusub_that_ignores_the_companion_s_sticks_or_learns_the_magnetic_f
     assert not failsafes_of("ardusub").learns_magnetic_field()
     for value, learns in ((3.0, True), (2.0, False)):
         assert failsafes_of("ardusub", EK3_MAG_CAL=value).learns_magnetic_field() == learns
-
-
-def test_px4_integer_parameters_are_decoded_from_bits():
-    assert failsafes_of("px4", NAV_RCL_ACT=3).values == {"NAV_RCL_ACT": 3.0}
-    assert "COM_OBL_RC_ACT 0: on lost set-points it changes to Position" in failsafes_of("px4", COM_OBL_RC_ACT=0).text()
 
 
 SAFE = {"ardusub": {"FS_GCS_ENABLE": 2.0}, "px4": {"COM_OF_LOSS_T": 1.0}}

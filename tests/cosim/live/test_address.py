@@ -34,8 +34,7 @@ HERE = LiveAddress("127.0.0.1", "127.0.0.1", 8765)
 @pytest.mark.parametrize(
     ("host", "origin", "is_own"),
     [
-        ("127.0.0.1:8765", None, True),
-        ("localhost:8765", "http://localhost:8765", True),
+        ("127.0.0.1:8765", None, True), ("localhost:8765", "http://localhost:8765", True),
         ("[::1]:8765", "http://[::1]:8765", True),
         ("127.0.0.1:9999", "http://127.0.0.1:9999", True),  # through a tunnel
         ("127.0.0.1:8765", "https://evil.example", False),
@@ -43,12 +42,9 @@ HERE = LiveAddress("127.0.0.1", "127.0.0.1", 8765)
         ("127.0.0.1:8765", "http://127.0.0.1:8765.evil.example", False),
         ("127.0.0.1:8765", "null", False),  # a file, or a sandboxed frame
         ("evil.example:8765", "http://evil.example:8765", False),  # a name that its owner lets point here
-        ("127.0.0.1.evil.example:8765", None, False),
-        ("", None, False),
-        (None, None, False),
-        ("[", None, False),
+        *((host, None, False) for host in ("127.0.0.1.evil.example:8765", "", None, "[")),
     ],
-)
+)  # fmt: skip
 def test_own_pages_and_programs_alone_are_accepted(host, origin, is_own):
     assert (foreign_origin(HERE, host, origin) is None) is is_own
 

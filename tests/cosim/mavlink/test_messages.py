@@ -122,22 +122,6 @@ def test_debug_arrays_hold_weights_clearances_and_thrusts(station):
     assert arrays[3].data[:4] == [-3.0, 2.0, 2.0, 2.0] and arrays[4].data[:2] == [13.5, -27.0]
 
 
-def test_obstacle_distances_are_relative_to_the_vehicle():
-    station = Station()
-    # SR1 of the scenario: a sphere of 0.5 m about (2, 0, 1.8); a seen one about (5, 2, 5) of 1 m
-    there, distance = np.array([5.0, 2.0, 5.0]) - [0.0, 0.0, -1e5], math.dist((1.0, 2.0, 5.0), (2.0, 0.0, 1.8)) - 0.5
-    station.look(1.0, **{
-        "quaternion.e0": tuple(TURN), "attitude.roll": EULER, "seen 1.shift.x": tuple(there),
-        "goal.clearance": (-3.0, distance, 2.0, 2.0, 3.0, 1e5),
-    })  # fmt: skip
-    vectors = {m.obstacle_id: (m.x, m.y, m.z) for m in station.request(11037)}
-    assert set(vectors) == {1, 4}
-    back = rotation_matrix(TURN).T
-    towards = np.array([2.0, 0.0, 1.8]) - [1.0, 2.0, 5.0]
-    assert vectors[1] == pytest.approx(back @ (towards * distance / np.linalg.norm(towards)), abs=1e-5)
-    assert vectors[4] == pytest.approx(back @ np.array([3.0, 0.0, 0.0]), abs=1e-5)
-
-
 def test_rangefinder_is_reported_only_above_a_bottom(station):
     assert [station.request(number) for number in (132, 173, 11038)] == [[]] * 3
     station.look(13.0, **{"altitude": 2.5, "measured.altitude": 2.5})

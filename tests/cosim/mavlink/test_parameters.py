@@ -176,21 +176,6 @@ def test_former_names_with_centre_are_read_and_set(station):
     assert read(station, "SR1_CENTRE").error == mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
 
 
-def test_former_names_are_of_keys_not_of_regions():
-    """A name that exists is itself, and one that never was names no other region."""
-    rest = "criterion='obstacle',keep='out',gain=1.0,shape={type='sphere',center"
-    regions = {
-        name: f"{{name='{name}',{rest}=[{x},0,5],radius={x}}}}}" for name, x in (("centre", 1.0), ("center", 2.0))
-    }
-    names = ("CENTRE_RADIUS", "CENTRE_CENTRE_X", "CENTER_RADIUS", "CENTER_CENTRE_X")
-    both = Station("ardusub", of=scenario("intersection=[]", f"regions=[{','.join(regions.values())}]"))
-    assert [value_of(both, name) for name in names] == [1.0, 1.0, 2.0, 2.0]
-    assert put(both, "CENTRE_RADIUS", 3.0) == [("CENTRE_RADIUS", 3.0)]
-    assert both.commanded() == [ChangeSetting("regions.centre.shape.radius", 3.0)]
-    alone = Station("ardusub", of=scenario("intersection=[]", f"regions=[{regions['center']}]"))
-    assert [read(alone, name).get_type() for name in names] == ["PARAM_ERROR"] * 2 + ["PARAM_VALUE"] * 2
-
-
 def test_unchanged_value_submits_no_command(station):
     for value in listed(station):
         *errors, back = put(station, value.param_id, value.param_value)

@@ -205,20 +205,6 @@ def test_files_without_a_key_of_their_own_are_rejected(tmp_path, content, mode, 
         load_key(tmp_path / "none")
 
 
-def test_signature_matches_published_example():
-    """The golden frame: key of 42s, made from the specification with hashlib and a bitwise checksum alone."""
-    head = bytes([9, 1, 0, 0, 255, 190, 0, 0, 0, 7, 0, 0, 0, 6, 8, 0, 0, 3])  # HEARTBEAT of a ground station
-    crc = 0xFFFF
-    for byte in (*head, 50):  # 50: its CRC_EXTRA
-        t = byte ^ crc & 0xFF
-        t = (t ^ t << 4) & 0xFF
-        crc = (crc >> 8 ^ t << 8 ^ t << 3 ^ t >> 4) & 0xFFFF
-    body = b"\xfd" + head + crc.to_bytes(2, "little") + b"\x05" + now().to_bytes(6, "little")
-    rx = open_filter(Verifier(b"*" * 32, SigningClock()))
-    ((_, message),) = rx.read_datagram(body + sha256(b"*" * 32 + body)[:6])
-    assert (message.custom_mode, message.type, message.autopilot) == (7, 6, 8)
-
-
 # ---- across restarts ----
 
 

@@ -83,15 +83,6 @@ def test_snapshots_are_ordered_copies_every_10_ms(ground):
     assert ground.sequence() == list(range(102))
 
 
-def test_every_row_of_a_coarse_run_is_observed():
-    vehicle = StubVehicle()
-    links = LinkThread(vehicle, [], step=0.05)
-    observe(links, *range(5), step=0.05)
-    links.start()
-    links.close()
-    assert len(vehicle.rows) == 5
-
-
 def test_blocks_of_rows_are_logged_whole_like_single_rows(tmp_path, monkeypatch):
     for name, value in (("MAX_SNAPSHOTS", 16), ("_IDLE_PERIOD", 1e-3), ("_FAST_RUN_PERIOD", 1e-3), ("_STALLED", 60.0)):
         monkeypatch.setattr(thread, name, value)

@@ -8,7 +8,6 @@ from cosim.errors import ScenarioError
 from cosim.scenario.scenario import load_scenario
 from fuzzy_arbiter import Arbiter, falling
 from fuzzy_arbiter.criteria import Criterion, prioritized
-from fuzzy_arbiter.formats import save
 
 FOUR = "inspection-visibility"
 RULES = """
@@ -145,18 +144,6 @@ def test_a_file_of_saved_criteria_has_weights_by_their_names(own, suffix):
     weights = Arbiter(loaded.rules.system)([0.25, 1.0])
     assert weights._fields == ("obstacle", "depth")
     assert weights._asdict() == pytest.approx(saved([0.25, 1.0])._asdict(), abs=1e-12)
-
-
-@pytest.mark.parametrize("suffix", ["json", "fcl", "fll", "fis"])
-def test_every_format_is_read(own, suffix):
-    path = own.parent / f"mine.{suffix}"
-    system = load_scenario(own).rules.system
-    save(system, path)
-    inputs = tomllib.loads(SCENARIO)["arbiter"]["inputs"]
-    said = ", ".join(f"{key} = {value!r}" for key, value in inputs.items()).replace("'", '"')
-    loaded = load_scenario(own, [f"arbiter.file={path}", f"arbiter.inputs={{{said}}}"])
-    for sample in ([0.3, 2.0, 0.4, 0.7], [4.0, 9.0, 0.1, 1.0]):
-        assert Arbiter(loaded.rules.system)(sample) == pytest.approx(Arbiter(system)(sample), abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -24,28 +24,18 @@ def label(key, name="paper-limited", overrides=()):
 @pytest.mark.parametrize(
     ("key", "words"),
     [
-        ("initial.position.1", "start position y [m]"),
-        ("initial.position", "start position [m]"),
-        ("initial.velocity.1", "start velocity v [m/s]"),
-        ("initial.velocity.5", "start velocity r [rad/s]"),
-        ("initial.quaternion.0", "start attitude, quaternion w"),
-        ("plant.current.2", "current z [m/s]"),
-        ("limit.force", "force limit [N]"),
-        ("law.gains.k_p1", "gain k_p1 [N/m3]"),
-        ("regions.SR1.gain", "gain of SR1"),
-        ("regions.0.velocity.2", "velocity z of SR1 [m/s]"),
-        ("regions.SR1.shape.center.0", "center x of SR1 [m]"),
-        ("regions.SR3.shape.tolerance", "tolerance of SR3 [m]"),
-        ("criteria.depth.order", "order of depth"),
-        ("goal.radius", "radius of the goal [m]"),
-        ("goal.center.2", "center z of the goal [m]"),
-        ("plant.parameters.weight", "weight of the plant [N]"),
-        ("plant.parameters.inertia.xz", "inertia.xz of the plant [kg m2]"),
-        ("time.duration", "duration [s]"),
-        ("arbiter.engine", "arbiter engine"),
-        ("regions", "regions"),
+        ("initial.position.1", "start position y [m]"), ("initial.position", "start position [m]"),
+        ("initial.velocity.1", "start velocity v [m/s]"), ("initial.velocity.5", "start velocity r [rad/s]"),
+        ("initial.quaternion.0", "start attitude, quaternion w"), ("plant.current.2", "current z [m/s]"),
+        ("limit.force", "force limit [N]"), ("law.gains.k_p1", "gain k_p1 [N/m3]"),
+        ("regions.SR1.gain", "gain of SR1"), ("regions.0.velocity.2", "velocity z of SR1 [m/s]"),
+        ("regions.SR1.shape.center.0", "center x of SR1 [m]"), ("regions.SR3.shape.tolerance", "tolerance of SR3 [m]"),
+        ("criteria.depth.order", "order of depth"), ("goal.radius", "radius of the goal [m]"),
+        ("goal.center.2", "center z of the goal [m]"), ("plant.parameters.weight", "weight of the plant [N]"),
+        ("plant.parameters.inertia.xz", "inertia.xz of the plant [kg m2]"), ("time.duration", "duration [s]"),
+        ("arbiter.engine", "arbiter engine"), ("regions", "regions"),
     ],
-)
+)  # fmt: skip
 def test_keys_have_readable_labels(key, words):
     assert label(key) == words
 

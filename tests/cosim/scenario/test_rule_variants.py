@@ -1,6 +1,7 @@
 """Rule variants for comparison with an arbiter, and path costs through its regions."""
 
 import itertools
+import json
 
 import numpy as np
 import pytest
@@ -75,31 +76,20 @@ def test_path_cost_is_highest_in_regions_of_top_priority():
 
 def test_arbiter_file_costs_use_its_own_input_signals(tmp_path):
     """A file over clearances: full membership on the surface, zero at the end of the universe."""
-    text = """FUNCTION_BLOCK mine
-VAR_INPUT risers : REAL; below : REAL; END_VAR
-VAR_OUTPUT obstacle : REAL; shape : REAL; depth : REAL; visibility : REAL; END_VAR
-FUZZIFY risers TERM near := (0, 1) (1, 0); TERM far := (0, 0) (1, 1); RANGE := (0 .. 1); END_FUZZIFY
-FUZZIFY below TERM near := (0, 1) (1, 0); TERM far := (0, 0) (1, 1); RANGE := (0 .. 1); END_FUZZIFY
-"""
-    for name in ("obstacle", "shape", "depth", "visibility"):
-        text += f"DEFUZZIFY {name} TERM low := (0, 1) (1, 0); TERM high := (0, 0) (1, 1); METHOD : COG; DEFAULT := 0; "
-        text += "RANGE := (0 .. 1); END_DEFUZZIFY\n"
-    text += "RULEBLOCK all AND : MIN; ACT : MIN; ACCU : MAX;\n"
-    said = ["risers IS near THEN shape IS high", "risers IS far THEN shape IS low"]
-    for name in ("depth", "visibility", "obstacle"):
-        said += [f"below IS near THEN {name} IS low", f"below IS far THEN {name} IS low"]
-    text += "".join(f"RULE {i} : IF {rule};\n" for i, rule in enumerate(said, 1))
-    text += "END_RULEBLOCK\nEND_FUNCTION_BLOCK\n"
-    (tmp_path / "mine.fcl").write_text(text)
-    scenario = load_scenario(
-        "inspection-visibility",
-        [
-            f'arbiter.file="{tmp_path / "mine.fcl"}"',
-            'arbiter.engine="exact"',
-            'arbiter.inputs.risers="clearance.risers"',
-            'arbiter.inputs.below="clearance.greatest depth"',
-        ],
-    )
+    others = ("depth", "visibility", "obstacle")
+    near_far = {"near": {"falling": [0, 1]}, "far": {"rising": [0, 1]}}
+    low_high = {"low": {"falling": [0, 1]}, "high": {"rising": [0, 1]}}
+    rules = ["if risers is near then shape is high", "if risers is far then shape is low"]
+    rules += [f"if below is {term} then {name} is low" for name in others for term in near_far]
+    system = {
+        "inputs": [{"name": name, "universe": [0, 1], "terms": near_far} for name in ("risers", "below")],
+        "outputs": [{"name": name, "universe": [0, 1], "default": 0, "terms": low_high} for name in ("shape", *others)],
+        "rules": rules,
+    }
+    (tmp_path / "mine.json").write_text(json.dumps(system))
+    signals = '{risers="clearance.risers",below="clearance.greatest depth"}'
+    changes = [f'arbiter.file="{tmp_path / "mine.json"}"', 'arbiter.engine="exact"', f"arbiter.inputs={signals}"]
+    scenario = load_scenario("inspection-visibility", changes)
     found = {r.criterion: r.region.crossing_cost for r in scenario.regions if not r.region.hard}
     high, low = 2.0 / 3.0, 1.0 / 3.0  # centroids of the two terms
     pressing, other = high / (high + low), 0.5

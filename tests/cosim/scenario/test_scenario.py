@@ -53,21 +53,8 @@ def test_minimal_file_gets_defaults(tmp_path):
     assert scenario.regions == ()
 
 
-def test_base_scenario_is_overridden_by_the_file(tmp_path):
-    path = saved(tmp_path, 'base = "paper"\nlimit = { force = 5.0 }\n')
-    scenario = load_scenario(path)
-    assert scenario.limit.force == 5.0
-    assert scenario.limit.time_constant == 0.0
-    assert len(scenario.regions) == 3
-
-
 def test_overlap_includes_only_keep_out_regions():
     assert load_scenario("paper", ["regions.SR1.keep=in", "intersection=[]"]).intersection == (1, 2)
-
-
-def test_base_may_be_a_file_beside(tmp_path):
-    saved(tmp_path, MINIMAL, "other.toml")
-    assert load_scenario(saved(tmp_path, 'base = "other.toml"\ntitle = "Mine"\n')).title == "Mine"
 
 
 def test_circular_base_is_rejected(tmp_path):
@@ -191,29 +178,20 @@ def test_moving_regions_are_listed():
 @pytest.mark.parametrize(
     ("keys", "exact"),
     [
-        ([], True),
-        (["sensing.seed=3"], True),
-        (["sensing.dead_for=1.0"], True),
-        (["sensing.dead_from=1.0"], True),
+        *((keys, True) for keys in ([], ["sensing.seed=3"], ["sensing.dead_for=1.0"], ["sensing.dead_from=1.0"])),
         (["sensing.dead_from=1.0", "sensing.dead_for=1.0"], False),
-        (["sensing.position_noise=0.1"], False),
-        (["sensing.velocity_noise=0.1"], False),
+        (["sensing.position_noise=0.1"], False), (["sensing.velocity_noise=0.1"], False),
     ],
-)
+)  # fmt: skip
 def test_sensing_is_exact_without_sensor_faults(keys, exact):
     assert load_scenario("paper", keys).sensing.exact == exact
 
 
 @pytest.mark.parametrize(
     "key",
-    [
-        "regions.port wall.gain",
-        'regions."port wall".gain',
-        "regions.'port wall'.gain",
-        ' "regions" . "port\\u0020wall" . \'gain\' ',
-        'regions."1".gain',
-    ],
-)
+    ["regions.port wall.gain", 'regions."port wall".gain', "regions.'port wall'.gain",
+     ' "regions" . "port\\u0020wall" . \'gain\' ', 'regions."1".gain'],
+)  # fmt: skip
 def test_keys_may_be_quoted_as_in_toml(key):
     docking = load_scenario("docking")
     wanted = load_scenario("docking", ["regions.1.gain=50"]).toml()

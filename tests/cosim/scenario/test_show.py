@@ -104,12 +104,10 @@ def test_every_gain_of_every_law_is_explained():
     ("law", "gain", "unit"),
     [
         ("ismail_dunnigan", "k_p1", "N/m3"), ("ismail_dunnigan", "k_v2", "N m s/rad"),
-        ("ismail_dunnigan", "sigma_p", "1/(m2 s)"),
-        ("ismail_dunnigan", "k_q", ""),
+        ("ismail_dunnigan", "sigma_p", "1/(m2 s)"), ("ismail_dunnigan", "k_q", ""),
         ("deployable", "coast", "s"), ("deployable", "braking_share", ""), ("deployable", "failure_threshold", ""),
         ("deployable", "current_drift", "m/s/sqrt(s)"), ("unarbitrated", "margin", "m2"),
-        ("antonelli", "k_theta_moment", "s2/(kg m2)"),
-        ("mine.py:steer", "speed", ""),
+        ("antonelli", "k_theta_moment", "s2/(kg m2)"), ("mine.py:steer", "speed", ""),
     ],
 )  # fmt: skip
 def test_gain_units_are_read_from_the_gain_comments(law, gain, unit):

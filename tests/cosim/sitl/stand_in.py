@@ -1,10 +1,13 @@
-"""Independent stand-ins that pack frames and parse answers by hand: for ArduPilot as it does, for PX4 by MAVLink 2."""
+"""Stand-ins: an ArduPilot that packs frames and parses answers by hand as it does, and a PX4 by pymavlink."""
 
+import contextlib
 import re
 import socket
 import struct
+from collections import deque
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 NUMBER = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
 
@@ -115,32 +118,11 @@ def heave(u):
 
 # ---- PX4 ----
 
-# id: extra byte of the checksum, and the payload's fields as they go over the wire
-MESSAGES = {
-    0: (50, "<IBBBBB"),
-    93: (47, "<QQ16fB"),
-    107: (108, "<Q13fIB"),
-    113: (124, "<QiiiHHHhhhHBB"),
-    115: (4, "<Q4f3fiiihhhHHhhh"),
-}
 ARMED = 128
 
 
-def checksum(data):
-    """CRC-16/MCRF4XX, as MAVLink has it."""
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ (0x8408 if crc & 1 else 0)
-    return crc
-
-
-def packed(number, *values, sequence=0):
-    extra, layout = MESSAGES[number]
-    payload = struct.pack(layout, *values).rstrip(b"\0") or b"\0"
-    frame = bytes([len(payload), 0, 0, sequence % 256, 1, 1]) + number.to_bytes(3, "little") + payload
-    return b"\xfd" + frame + checksum(frame + bytes([extra])).to_bytes(2, "little")
+def controls_message(controls, mode=ARMED, frame=0):
+    return mavlink.MAVLink_hil_actuator_controls_message(frame, [*controls, *[0.0] * (16 - len(controls))], mode, 1)
 
 
 class Px4(Peer):
@@ -148,47 +130,43 @@ class Px4(Peer):
 
     def __init__(self, address):
         self.socket = socket.create_connection(address, timeout=120.0)
-        self.data, self.seen, self.frames = b"", {}, 0
-        self.say(packed(0, 0, 2, 12, 0, 4, 3))
+        self.codec, self.coming, self.seen, self.frames = mavlink.MAVLink(None, 1, 1), deque(), {}, 0
+        self.say(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3).pack(self.codec))
+
+    def __exit__(self, *_):
+        with contextlib.suppress(OSError):  # what is closed with data unread takes back what it has sent last
+            self.socket.shutdown(socket.SHUT_WR)
+            while self.socket.recv(4096):
+                pass
+        self.socket.close()
 
     def say(self, data):
         self.socket.sendall(data)
 
-    def message(self):
-        """The next message's number and fields; its checksum must be right."""
-        while len(self.data) < 12 or len(self.data) < 12 + self.data[1]:
-            data = self.socket.recv(4096)
-            if not data:
-                raise EOFError
-            self.data += data
-        n = self.data[1]
-        frame, self.data = self.data[: 12 + n], self.data[12 + n :]
-        assert frame[0] == 0xFD
-        number = int.from_bytes(frame[7:10], "little")
-        extra, layout = MESSAGES[number]
-        assert checksum(frame[1:-2] + bytes([extra])) == int.from_bytes(frame[-2:], "little")
-        size = struct.calcsize(layout)  # zeros at the end are left out, extensions come behind it
-        return number, struct.unpack(layout, frame[10:-2].ljust(size, b"\0")[:size])
-
     def sensors(self):
-        """Return the next HIL_SENSOR; earlier messages are in `seen`."""
+        """Return the next HIL_SENSOR; `seen` has the newest message of each type."""
         while True:
-            number, fields = self.message()
-            self.seen[number] = fields
-            if number == 107:
-                return fields
+            while not self.coming:
+                data = self.socket.recv(4096)
+                if not data:
+                    raise EOFError
+                self.coming += self.codec.parse_buffer(data) or ()
+            message = self.coming.popleft()
+            self.seen[message.get_type()] = message
+            if message.get_type() == "HIL_SENSOR":
+                return message
 
     def answer(self, controls, mode=ARMED):
-        values = (*controls, *[0.0] * (16 - len(controls)))
-        self.say(packed(93, self.frames, 1, *values, mode, sequence=self.frames))
+        self.say(controls_message(controls, mode, self.frames).pack(self.codec))
+        self.codec.seq = (self.codec.seq + 1) % 256
         self.frames += 1
 
     def fly(self, controls, frames=1):
         """Answer so many frames of sensors, perhaps by a function of them; return the last."""
         for _ in range(frames):
-            fields = self.sensors()
-            self.answer(controls(fields) if callable(controls) else controls)
-        return fields
+            sensors = self.sensors()
+            self.answer(controls(sensors) if callable(controls) else controls)
+        return sensors
 
 
 def down(u):

@@ -6,6 +6,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.errors import RunError
 from cosim.results.record import load_record
@@ -13,7 +14,7 @@ from cosim.sitl.hil_server import LEFT, HilServer
 from cosim.sitl.json_server import JsonServer
 from cosim.sitl.law import make_pwm_law
 from cosim.sitl.sitl_session import RESTARTED, FlightOptions, SitlSession
-from tests.cosim.sitl.stand_in import ARMED, Px4, StandIn, down, heave, packed
+from tests.cosim.sitl.stand_in import Px4, StandIn, controls_message, down, heave
 
 
 @pytest.fixture(params=["json", "hil"])
@@ -27,11 +28,14 @@ def begin(kind, request):
     return request.getfixturevalue({"json": "serve", "hil": "serve_px4"}[kind])
 
 
+CODEC = mavlink.MAVLink(None, 1, 1)
+
+
 def garbage(draw, k):
     """Return datagrams and parts of a stream that are no frames: lengths, rates and checksums are wrong."""
     sizes = [0, 1, 39, 40, 41, 72, 1400]
     datagrams = draw.randbytes(draw.choice(sizes)), struct.pack("<HHI16H", 18458, draw.randrange(11), k, *[1900] * 16)
-    stream = b"\x00not mavlink\xff", packed(93, 1, 1, *[1.0] * 16, ARMED)[:-1] + b"\0"
+    stream = b"\x00not mavlink\xff", bytes(controls_message([1.0] * 16).pack(CODEC)[:-1]) + b"\0"
     return {"json": datagrams, "hil": stream}
 
 
