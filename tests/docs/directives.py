@@ -5,7 +5,6 @@ The same for a page that is to be free of them stands in ``beside/PAGE.toml``, b
 ==========================================  =======================================================================
 ``not run: REASON``                         of a block, or with ``"PREFIX"`` after ``run`` of the lines that begin so
 ``run with: ARGUMENTS``                     appended to its commands, or with ``"PREFIX"`` to those that begin so
-``page run with "PREFIX": ARGUMENTS``       the same for all blocks from there on
 ``exits: STATUS``                           of its commands, or with ``"PREFIX"`` of those that begin so; otherwise 0
 ``given: PATH as NAME``                     a file of the repository is copied into the folder before
 ``file: NAME``                              the block is written into the folder
@@ -25,13 +24,13 @@ from dataclasses import dataclass, field
 from typing import Self
 
 REASONS = ("needs ", "takes ", "changes ", "formula", "drawing", "template ", "excerpt ")
-_PREFIXED = re.compile(r'(page run with|run with|not run|exits)(?: "([^"]+)")?: (\S.*)')
+_PREFIXED = re.compile(r'(run with|not run|exits)(?: "([^"]+)")?: (\S.*)')
 _GIVEN = re.compile(r"given: (\S+) as (\S+)")
 _NAMED = re.compile(r"(file|commands of): (\S.*)")
 _KIND = re.compile(r"(scenario|vehicle|arbiter|column map|scenes)(?: onto: (\S+))?")
 _SETUP = re.compile(r'setup (sh|python)(?: "([^"]+)")?\n(.*)', re.S)
 _WORDS = re.compile(
-    r"(page run|run with|not run|exits|given|file:|setup|scenario|vehicle|arbiter|column map|scenes|commands of"
+    r"(run with|not run|exits|given|file:|setup|scenario|vehicle|arbiter|column map|scenes|commands of"
     r"|alone|slow)\b"
 )
 
@@ -57,10 +56,10 @@ class Directives:
     slow: bool = False
 
     @classmethod
-    def read(cls, where: str, comments: Iterable[str], everywhere: Iterable[str] = ()) -> Self:
+    def read(cls, where: str, comments: Iterable[str]) -> Self:
         """Parse directives from comments; an unknown form is a PageError."""
         found = cls()
-        for text in (*everywhere, *comments):
+        for text in comments:
             found._add(where, text)
         return found
 
@@ -89,11 +88,6 @@ class Directives:
             setattr(self, text, True)
         else:
             raise PageError(f"{where}: unknown directive {text.splitlines()[0] if text else ''!r}")
-
-
-def page_wide(text: str) -> bool:
-    """Return whether a comment speaks of all blocks that follow."""
-    return text.startswith("page run with ")
 
 
 def looks_like_one(text: str) -> bool:

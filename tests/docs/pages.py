@@ -9,7 +9,7 @@ from pathlib import Path
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
-from tests.docs.directives import Directives, PageError, looks_like_one, page_wide
+from tests.docs.directives import Directives, PageError, looks_like_one
 
 ROOT = Path(__file__).parents[2]
 BESIDE = Path(__file__).parent / "beside"  # of pages that are to be free of directives: NAME.toml
@@ -66,13 +66,10 @@ def inline_code(page: Path) -> list[tuple[int, str]]:
 def _blocks(name: str, tokens: list[Token], beside: dict[str, list[str]]) -> Iterator[Block]:
     above: list[str] = []  # comments that await their fence
     awaited = dict(beside)
-    everywhere: list[str] = []
     for token in tokens:
         line = token.map[0] + 1 if token.map else 0
         if token.type == "html_block":
-            comments = [text.strip("\n ") for text in _COMMENT.findall(token.content)]
-            everywhere += [text for text in comments if page_wide(text)]
-            above += [text for text in comments if not page_wide(text)]
+            above += [text.strip("\n ") for text in _COMMENT.findall(token.content)]
         elif token.type == "fence":
             language = token.info.strip()
             where = f"{name}:{line + 1}"
@@ -80,7 +77,7 @@ def _blocks(name: str, tokens: list[Token], beside: dict[str, list[str]]) -> Ite
                 raise PageError(f"{where}: a block without a language")
             for begins in [begins for begins in awaited if token.content.startswith(begins)]:
                 above += awaited.pop(begins)
-            yield Block(name, line + 1, language, token.content, Directives.read(where, above, everywhere))
+            yield Block(name, line + 1, language, token.content, Directives.read(where, above))
             above = []
         elif token.type == "code_block":
             raise PageError(f"{name}:{line}: an indented block: use a fence with a language")
