@@ -87,7 +87,7 @@ def decode(table: Any, kind: Any, where: str = "") -> Any:
     try:
         return msgspec.convert((table,), types.GenericAlias(tuple, (kind,)))[0]  # so that every error ends in a path
     except UnicodeEncodeError as error:  # from a command line: files are read as UTF-8
-        raise TableError(f"{where or 'a text'}: {error.object!r} is no UTF-8, expected such a text") from error
+        raise TableError(f"{where or 'a text'}: {error.object!r} is no UTF-8, expected text in UTF-8") from error
     except msgspec.ValidationError as error:
         raise TableError(_describe(error, table, kind, where)) from error
 

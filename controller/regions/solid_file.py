@@ -59,7 +59,7 @@ def signed_distances(path: Path, solid: Mesh, points: Array) -> Array:
     odd = np.flatnonzero((winding < -0.5) | (winding > 1.5))
     if odd.size:
         where = ", ".join(f"{x:.4g}" for x in points[odd[0]])
-        raise RegionError(f"{path}: bodies overlap, or one is inside out, at [{where}] m NED, expected bodies apart")
+        raise RegionError(f"{path}: bodies overlap, or one is inside out, at [{where}] m NED, expected separate bodies")
     distances, *_ = igl.signed_distance(
         points, solid.vertices, solid.triangles, sign_type=igl.SIGNED_DISTANCE_TYPE_UNSIGNED
     )
@@ -130,7 +130,7 @@ def _require_no_crossings(path: Path, loaded: Any) -> None:
         if crossings.size:
             place = start[crossings[0]] + t[crossings[0]] * along[crossings[0]]
             raise RegionError(
-                f"{path}: the surface crosses itself at {_place(place)} in the file's units, expected bodies united"
+                f"{path}: the surface crosses itself at {_place(place)} in the file's units, expected one outer surface"
             )
 
 

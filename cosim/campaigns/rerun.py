@@ -113,7 +113,7 @@ def complete_results(folder: Path, schema: Any) -> Results:
 def require_complete(folder: Path) -> None:
     """Raise `RunError` if a folder holds no complete campaign."""
     if not (folder / RESULTS).exists():
-        raise RunError(f"{folder}: is not complete, expected a campaign that is; its own command goes on with it")
+        raise RunError(f"{folder}: is not complete, expected a campaign that is; repeat its command to resume it")
 
 
 def _sweep_repeat(folder: Path, plan: dict[str, Any], stored: dict[str, Any], own: OwnLaw | None) -> Repeat:

@@ -66,8 +66,8 @@ def _add_scenes(verb: argparse.ArgumentParser) -> None:
 
 def add_campaign_folder(verb: argparse.ArgumentParser) -> None:
     """Add the flags for the folder of a campaign, and for the replays of its worst flights."""
-    flag(verb, "--out DIR", "a new folder, or one to go on with what is left", Path, required=True)
-    flag(verb, "--replays N", "worst flights, of each law, that are repeated with a replay", int_range(0, 1000), 3)
+    flag(verb, "--out DIR", "a new folder, or an unfinished one to resume", Path, required=True)
+    flag(verb, "--replays N", "number of worst flights of each law to repeat with a replay", int_range(0, 1000), 3)
 
 
 def add_workers(verb: argparse.ArgumentParser) -> None:

@@ -69,7 +69,7 @@ def _search(options: argparse.Namespace) -> Any:
     if what in FAMILIES:
         refuse_flags(options, ["vary"], f"none with the family {what}: its generator says what varies")
         if not options.law:
-            raise RunError(f"--law is missing: who flies the scenes of the family {what}")
+            raise RunError(f"--law is missing, expected one that flies the scenes of the family {what}")
         law = to_law(options.law)
         return SceneSearch(what, SceneTask(law, gains_from(law, options.set), Conditions()), settings)
     if what.endswith(".jsonl"):

@@ -23,8 +23,8 @@ def add_verbs(verbs: Any) -> None:
         "logs", type=Path, nargs="+", metavar="LOG",
         help=".bin, .tlog, .ulg, .csv, .parquet, .mcap, .db3, .bag or a bag's folder; several of one run are joined",
     )  # fmt: skip
-    flag(verb, "--vehicle NAME", "a shipped vehicle or a TOML file, whose thrusters are driven", required=True)
-    flag(verb, "--scenario NAME", "shipped name or TOML file, whose goal and regions judge it (default: none)")
+    flag(verb, "--vehicle NAME", "the vehicle of the log: a shipped name, or a TOML file", required=True)
+    flag(verb, "--scenario NAME", "shipped name or TOML file, whose goal and regions score the run (default: none)")
     flag(verb, "--map FILE", "column map, for tables and bags of ROS; without one a draft is printed", Path)
     flag(verb, "--rate HZ", "rows per second (default: by the log)", float_range(1e-3, 1e4))
     curves = "linear", "quadratic", "t200"

@@ -29,7 +29,7 @@ def add_link_flags(verb: argparse.ArgumentParser, commands: bool = False, requir
     )  # fmt: skip
     flag(verb, "--profile", "type of vehicle that the link imitates", default=usual.profile, choices=PROFILES)
     add_remote(verb)
-    flag(verb, "--allow-system ID[,ID]", "accept these system ids alone (default: all)", _systems)
+    flag(verb, "--allow-system ID[,ID]", "accept only these system ids (default: all)", _systems)
     flag(verb, "--system-id N", "system id of the vehicle", _SYSTEM, usual.system_id)
     flag(verb, "--origin LAT,LON", "coordinates of position 0 (default: {:.7f},{:.7f})".format(*usual.origin), origin)
     verb.set_defaults(commands=False, await_arm=False, link_loss=None, link_timeout=None)
@@ -41,7 +41,7 @@ def add_link_flags(verb: argparse.ArgumentParser, commands: bool = False, requir
     flag(
         verb,
         "--link-timeout S",
-        f"silence that counts as link loss (default: {usual.loss_timeout:g})",
+        f"silence [s] that counts as link loss (default: {usual.loss_timeout:g})",
         float_range(0.1, 3600.0),
     )
 

@@ -37,7 +37,7 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     verb.add_argument("endpoint", metavar="ENDPOINT", help="such as udpin:127.0.0.1:14550 or tcp:127.0.0.1:5760")
     add_remote(verb)
-    flag(verb, "--once", f"print one picture, after {_ONCE:g} s, and end")
+    flag(verb, "--once", f"print one table, after {_ONCE:g} s, and end")
     flag(verb, "--seconds S", "end after so many seconds", float_range(1e-9, 1e9))
     flag(verb, "--count N", "end after so many messages", int_range(1, 10**12))
 

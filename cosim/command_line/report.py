@@ -15,7 +15,7 @@ _FORMATS = ("html", "png")
 def add_verbs(verbs: Any) -> None:
     """Add the verb to the subparsers of the command."""
     verb = add_verb(
-        verbs, "report", report, "write summary, report and replay of runs again, or of killed ones", "replay",
+        verbs, "report", report, "write summary, report and replay of runs again, also of killed ones", "replay",
         ("report runs/docking", "report runs/docking --format png", "report runs/a runs/b --replay --out both.html"),
     )  # fmt: skip
     verb.add_argument("folders", type=Path, nargs="+", metavar="RUN", help="a run folder, also of a killed run")

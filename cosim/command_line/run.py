@@ -36,7 +36,7 @@ def add_verbs(verbs: Any) -> None:
     add_run_folder(verb)
     add_changes(verb, "a key of the scenario, such as law.gains.k_p1=10 or regions.SR1.shape.radius=0.7")
     flag(verb, "--law NAME|FILE", "law such as pd, an .fmu file, or FILE.py:NAME; instead of the scenario's own")
-    flag(verb, "--rate N|max", "most simulated seconds per second (default: max; 1 with --commands or --live)", rate)
+    flag(verb, "--rate N|max", "maximum simulated seconds per second (default: max; 1 with --commands or --live)", rate)
     flag(verb, "--json", "print the outcome, and the paths of the files, as JSON")
     flag(verb, "--replay-commands FILE", "repeat the commands.jsonl of an earlier run, with its scenario", Path)
     add_live_flag(verb, "show the run in browsers while it goes on, and take their commands with --commands")

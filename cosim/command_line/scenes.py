@@ -22,7 +22,7 @@ def add_verbs(verbs: Any) -> None:
     flag(
         verb,
         "--seed S",
-        "seed of the first scene, which the next ones count up",
+        "seed of the first scene; each further one counts up by 1",
         int_range(0, 2**63 - 1 - _MAX_COUNT),
         0,
     )

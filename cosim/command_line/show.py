@@ -17,16 +17,16 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     add_scenario(verb, nargs="?")
     add_changes(verb)
-    flag(verb, "--short", "without the keys that have their default: a beginning for a scenario of one's own")
+    flag(verb, "--short", "leave out keys that have their default: a start for your own scenario")
     flag(verb, "--json", "print the list of shipped scenarios as JSON")
 
     verb = add_verb(
-        verbs, "check", check, "find problems of a scenario before it is run; exit code 1 if there are any",
+        verbs, "check", check, "find problems of a scenario without a run; exit code 1 if there are any",
         "scenarios", ("check docking", "check paper --set law.gains.sigma_p=0.1 --json"),
     )  # fmt: skip
     add_scenario(verb)
     add_changes(verb)
-    flag(verb, "--json", "print it as JSON")
+    flag(verb, "--json", "print the result as JSON")
 
 
 def show(options: argparse.Namespace) -> int:

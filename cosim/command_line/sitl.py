@@ -29,16 +29,16 @@ def add_verbs(verbs: Any) -> None:
     ports = "default: {ardupilot}, with px4 {px4}".format(**_PORTS)
     flag(verb, "--port N", ports, int_range(1, 65535))
     flag(verb, "--host ADDRESS", "bound address", default="127.0.0.1")
-    flag(verb, "--allow-remote", "let the address be seen from other machines")
+    flag(verb, "--allow-remote", "accept connections from other machines")
     flag(verb, "--timeout S", "end after so many seconds without a frame (default: never)", float_range(1e-3, 1e6))
-    flag(verb, "--speedup N", "with px4: most simulated seconds per second (default: 1)", float_range(0.01, 100.0))
+    flag(verb, "--speedup N", "with px4: maximum simulated seconds per second (default: 1)", float_range(0.01, 100.0))
     flag(
         verb, "--record-rate HZ", "maximum number of recorded rows per simulated second", float_range(1e-3, 1e6), 100.0
     )
-    flag(verb, "--autopilot ENDPOINT", "with ardupilot: its port, such as tcp:127.0.0.1:5762; records its estimate")
+    flag(verb, "--autopilot ENDPOINT", "with ardupilot: its second link, such as tcp:127.0.0.1:5762; records its estimate")
     flag(verb, "--dvl HZ", "rate of VISION_POSITION_DELTA to the autopilot, in simulated time", float_range(0.1, 100.0))
-    flag(verb, "--dvl-latency S", "their latency", float_range(0.0, 10.0), 0.1)
-    flag(verb, "--dvl-dropout PART", "part of these messages that is lost", float_range(0.0, 1.0), 0.0)
+    flag(verb, "--dvl-latency S", "latency of these messages", float_range(0.0, 10.0), 0.1)
+    flag(verb, "--dvl-dropout PART", "fraction of these messages that is lost", float_range(0.0, 1.0), 0.0)
     add_run_folder(verb)
 
 
@@ -106,5 +106,5 @@ def _address(host: str, port: int, allow_remote: bool) -> tuple[str, int]:
     except OSError as error:
         raise RunError(f"--host {host!r}: is not known: {error}") from error
     if not (allow_remote or is_loopback):
-        raise RunError(f"--host {host!r}: {found} can be seen from other machines; --allow-remote lets it")
+        raise RunError(f"--host {host!r}: {found} is reachable from other machines; --allow-remote allows it")
     return found, port

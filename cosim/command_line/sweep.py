@@ -36,7 +36,11 @@ def add_verbs(verbs: Any) -> None:
     flag(varied, "--vehicles FILE.jsonl", "vehicles that cosim identify has drawn: each is the plant of a row", Path)
     flag(verb, "--law NAME|FILE", "law such as pd, an .fmu file, or FILE.py:NAME; instead of the scenario's own")
     flag(verb, "--samples N", "number of rows, unless the design is a grid", int)
-    flag(verb, "--design grid|random|sobol|lhs|paired", "how rows are spread (default: random; of --vehicles: paired)")
+    flag(
+        verb,
+        "--design grid|random|sobol|lhs|paired",
+        "how rows are spread over the ranges (default: random; of --vehicles: paired)",
+    )
     flag(verb, "--seed S", "seed of the design and the rows", int, 0)
     add_campaign_folder(verb)
     add_cluster(verb)

@@ -87,5 +87,5 @@ def _match_names(pattern: str, names: Sequence[str]) -> list[str]:
     matching = [name for name in names if name == pattern] or [name for name in names if fnmatchcase(name, pattern)]
     if not matching:
         near = difflib.get_close_matches(pattern[:MAX_COMPARED], names, n=3, cutoff=0.0)
-        raise ExportError(f"--signals {pattern}: fits no signal of the run; expected such as {', '.join(near)}")
+        raise ExportError(f"--signals {pattern}: matches no signal of the run; expected such as {', '.join(near)}")
     return matching

@@ -55,7 +55,7 @@ def identify(
     """Identify parameters of a vehicle from recorded runs."""
     # `free`: default by the structure. `turns_measured`: attitude and angular velocity are inputs.
     if not runs:
-        raise IdentificationError("no run is given, expected one at the least")
+        raise IdentificationError("no run is given, expected at least one")
     vehicle = load_vehicle(start)
     logs, held_out_logs = (tuple(load_log(run, vehicle) for run in folders) for folders in (runs, held_out))
     structure, delays = None, None
@@ -66,7 +66,7 @@ def identify(
     else:
         parameters = free_parameters(vehicle, free or (TRANSLATION_FREE if turns_measured else DEFAULT_FREE))
         if free is not None and not free:
-            raise IdentificationError("--free: nothing is free, expected one key at the least")
+            raise IdentificationError("--free: nothing is free, expected at least one key")
         parameters += nuisances(nuisance, logs, common_delay=turns_measured)
     try:
         fitted = fit(logs, vehicle, parameters, progress, RANDOM_FORCE in nuisance, turns_measured, delays)

@@ -134,7 +134,7 @@ def load_log(folder: Path, vehicle: Vehicle) -> Log:
     commands = record.stack([*thrusters, *wrench])
     known = np.isfinite(commands).all(axis=1)
     if known.sum() < _MIN_SAMPLES or not np.any(commands[known]):
-        raise IdentificationError(f"{folder}: the thrusters rest, expected commands")
+        raise IdentificationError(f"{folder}: the thrusters are never driven, expected commands")
     facts = load_log_facts(folder).topics if (folder / IMPORT).exists() else ()
     topics = tuple(_with_mean(topic, facts) for topic in _topics(record, time))
     names = {topic.name for topic in topics}

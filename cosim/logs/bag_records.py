@@ -206,7 +206,7 @@ def _fields(data: bytes, offset: int) -> dict[bytes, bytes]:
         name, equals, value = data[offset + _TEXT : offset + _TEXT + length].partition(b"=")
         offset += _TEXT + length
         if not equals or offset > end:
-            raise ValueError("a header has a field that is none")
+            raise ValueError("a header has a damaged field")
         fields[name] = value
     return fields
 

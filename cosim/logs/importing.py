@@ -128,7 +128,7 @@ def import_log(
     path = paths[0] if paths else Path()
     try:
         if not paths:
-            raise ImportLogError("no log is given, expected one at the least")
+            raise ImportLogError("no log is given, expected at least one")
         loaded = load_vehicle(Path(vehicle) if str(vehicle).endswith(".toml") else str(vehicle))
         if curve is not None and curve not in CURVES:
             raise ImportLogError(f"curve is {curve!r}, expected one of {', '.join(CURVES)}")

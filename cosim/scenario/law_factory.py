@@ -58,7 +58,7 @@ def require_builtin_law(scenario: Scenario) -> None:
         raise RunError(f"law.file is {scenario.law.name!r}, expected here no FMU but law.name, one of {known}")
     if scenario.law.is_custom:
         raise RunError(
-            f"law.name is {scenario.law.name!r}, a law of one's own, whose code no scenario holds: expected "
+            f"law.name is {scenario.law.name!r}, a law in Python, whose code no scenario holds: expected "
             f"--law FILE.py:NAME, or law= in Python, or another law.name, one of {known}"
         )
 

@@ -199,7 +199,7 @@ def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_
 def check_mission(mission: Mission, law: LawSetup) -> None:
     """Raise `ScenarioError` unless the law takes the headings and speeds of a mission."""
     if mission.turns and law.is_custom:
-        expected = "'kept' at each place: a law of one's own is given no attitude"
+        expected = "'kept' at each place: a law in Python gets no attitude"
         raise ScenarioError(f"goal: headings for law {law.name}, expected heading = {expected}")
     takers = [name for name, kind in sorted(LAWS.items()) if kind.takes_speed]
     if mission.limits_speed and law.name not in takers:

@@ -94,7 +94,7 @@ class FmuPlant:
 
     def step(self, step: float) -> None:
         """Raise an error, as a step needs all signals of a run: C calls the FMU."""
-        raise PlantError(f"{self.fmu.label}: an FMU of one's own has no step in Python, expected a run of its scenario")
+        raise PlantError(f"{self.fmu.label}: a user's FMU has no step in Python, expected a run of its scenario")
 
     def read_flags(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Return the Boolean outputs; all stay False, since the FMU gives none."""

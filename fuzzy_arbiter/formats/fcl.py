@@ -219,7 +219,9 @@ def _format_range(v: Variable) -> str:
 def _format_output(output: Output, system: System) -> list[str]:
     method = word_of("fcl", "defuzzifier", output.defuzzifier)
     if method == "COGSS":
-        raise UnsupportedError(f"fcl cannot say the defuzzifier 'sum' of output {output.name!r}: expected 'average'")
+        raise UnsupportedError(
+            f"fcl cannot express the defuzzifier 'sum' of output {output.name!r}: expected 'average'"
+        )
     if output.weighted and any(isinstance(term.shape, Formula | Linear) for term in output.terms):
         method = "COGF"
     lines = [f"  METHOD : {method};"]
@@ -248,4 +250,6 @@ def _require_one_case(system: System) -> None:
         for name in names:
             other = known.setdefault(name.lower(), name)
             if other != name:
-                raise UnsupportedError(f"fcl cannot say the names {other!r} and {name!r}: they differ in case alone")
+                raise UnsupportedError(
+                    f"fcl cannot express the names {other!r} and {name!r}: they differ in case alone"
+                )

@@ -103,7 +103,7 @@ def format_shape(shape: Membership | Value, term: str, inputs: Sequence[str]) ->
         return f"FUNCTION {text}"
     assert isinstance(shape, Curve)
     if shape.height != 1.0:
-        raise UnsupportedError(f"fcl cannot say the height {shape.height!r} of term {term!r}: expected 1")
+        raise UnsupportedError(f"fcl cannot express the height {shape.height!r} of term {term!r}: expected 1")
     parameters = shape.parameters
     if shape.kind == "cosine":
         return f"COSINE {format_numbers((parameters[1] / 2.0, parameters[0]))}"
@@ -113,11 +113,11 @@ def format_shape(shape: Membership | Value, term: str, inputs: Sequence[str]) ->
     if not word:
         known = ", ".join(name for name, kind in KINDS.items() if kind.fcl)
         raise UnsupportedError(
-            f"fcl cannot say the kind {shape.kind!r} of term {term!r}: expected points, or one of {known}, cosine"
+            f"fcl cannot express the kind {shape.kind!r} of term {term!r}: expected points, or one of {known}, cosine"
         )
     if word == "DSIGM" and not _rises_first(*parameters):
         raise UnsupportedError(
-            f"fcl cannot say term {term!r}, a sigmoid_difference of which the second sigmoid may be above the first"
+            f"fcl cannot express term {term!r}, a sigmoid_difference of which the second sigmoid may be above the first"
         )
     return f"{word} {format_numbers(parameters[i] for i in order)}"
 

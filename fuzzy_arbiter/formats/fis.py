@@ -191,7 +191,7 @@ def write(system: System) -> str:
     names = [name for v in (*system.inputs, *system.outputs) for name in (v.name, *v.term_names)]
     for name in (system.name, *names):
         if any(sign in name for sign in _SIGNS):
-            raise UnsupportedError(f"fis cannot say the name {name!r}: expected none of {' '.join(_SIGNS)}")
+            raise UnsupportedError(f"fis cannot express the name {name!r}: expected none of {' '.join(_SIGNS)}")
     type_word, method, aggregation = _method(system)
     keys = zip(_METHODS, (*operator_words("fis", system), aggregation), strict=True)
     lines = [f"% {text}" for text in format_settings(system)]
@@ -214,24 +214,26 @@ def _method(system: System) -> tuple[str, str, str]:
     for output in system.outputs:
         for key, usual in (("default", None), ("lock_range", False), ("lock_previous", False)):
             if getattr(output, key) is not usual:
-                raise UnsupportedError(f"fis cannot say the {key} {getattr(output, key)!r} of output {output.name!r}")
+                raise UnsupportedError(
+                    f"fis cannot express the {key} {getattr(output, key)!r} of output {output.name!r}"
+                )
     pairs = list(dict.fromkeys((o.defuzzifier, o.aggregation) for o in system.outputs))
     if len(pairs) > 1:
         several = f"several defuzzifiers and aggregations, {'; '.join(map(', '.join, pairs))}"
-        raise UnsupportedError(f"fis cannot say outputs of {several}: expected one")
+        raise UnsupportedError(f"fis cannot express outputs of {several}: expected one")
     ((defuzzifier, aggregation),) = pairs
     method = word_of("fis", "defuzzifier", defuzzifier)
     if defuzzifier not in WEIGHTED:
         return "mamdani", method, word_of("fis", "aggregation", aggregation)
     if aggregation != "sum":
-        raise UnsupportedError(f"fis cannot say the aggregation {aggregation!r} of values: expected 'sum'")
+        raise UnsupportedError(f"fis cannot express the aggregation {aggregation!r} of values: expected 'sum'")
     values = all(isinstance(term.shape, Value) for output in system.outputs for term in output.terms)
     return ("sugeno" if values else "tsukamoto"), method, "sum"
 
 
 def _format_term(term: Term, v: Variable) -> str:
     """Format a term's name, function and parameters."""
-    shape, what = term.shape, f"fis cannot say the term {term.name!r} of {v.name!r}"
+    shape, what = term.shape, f"fis cannot express the term {term.name!r} of {v.name!r}"
     word, numbers, _ = parts_of(shape)
     if isinstance(shape, Shape):
         function = _straight(shape, v)

@@ -154,7 +154,7 @@ def _rules(block: Block, values: set[str]) -> RuleBlock:
 def write(system: System) -> str:
     """Format a system in the FuzzyLite Language."""
     if "#" in system.name:
-        raise UnsupportedError(f"fll cannot say the name {system.name!r}: what follows # is a comment")
+        raise UnsupportedError(f"fll cannot express the name {system.name!r}: what follows # is a comment")
     require_words(system, "fll", RESERVED, FUNCTION_NAMES)
     lines = [f"# {text}" for text in format_settings(system, settings_of(system.outputs))]
     lines.append(f"Engine: {system.name}")

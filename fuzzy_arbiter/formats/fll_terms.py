@@ -35,7 +35,7 @@ def parts_of(shape: Membership | Value) -> tuple[str, tuple[float, ...], str]:
     if isinstance(shape, Constant):
         return "constant", (shape.value,), ""
     if not isinstance(shape, Formula):
-        raise UnsupportedError(f"cannot say the term {shape!r}")
+        raise UnsupportedError(f"cannot express the term {shape!r}")
     return "formula", (), shape.text
 
 

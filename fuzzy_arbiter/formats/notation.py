@@ -60,11 +60,11 @@ def require_words(
     for name in (*others, *(name for v in (*system.inputs, *system.outputs) for name in (v.name, *v.term_names))):
         if not re.fullmatch(r"[^\W\d_]\w*", name, re.ASCII if format == "fcl" else 0):
             expected = "expected letters, digits and _, a letter first"
-            raise UnsupportedError(f"{format} cannot say the name {name!r}: {expected}")
+            raise UnsupportedError(f"{format} cannot express the name {name!r}: {expected}")
         if name.lower() in {*KEYWORDS, *reserved} or name in functions:
-            raise UnsupportedError(f"{format} cannot say the name {name!r}: it is a word of the language")
+            raise UnsupportedError(f"{format} cannot express the name {name!r}: it is a word of the language")
 
 
 def unsupported_rule(format: str, i: int, rule: Rule, expected: str, what: str = "condition") -> UnsupportedError:
     """Return the error for a rule that a format cannot represent."""
-    return UnsupportedError(f"{format} cannot say the {what} of R{i + 1} {str(rule)!r}: expected {expected}")
+    return UnsupportedError(f"{format} cannot express the {what} of R{i + 1} {str(rule)!r}: expected {expected}")

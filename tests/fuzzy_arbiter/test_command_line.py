@@ -190,7 +190,7 @@ def test_failed_convert_writes_nothing(refused, tmp_path):
     assert "none.json" in refused("convert", "none.json", "old.json")
     Arbiter(weight=replace(WEIGHT, default=0.5)).save(tmp_path / "default.toml")
     (tmp_path / "old.fis").write_text("old")
-    assert "fis cannot say the default 0.5" in refused("convert", "default.toml", "old.fis")
+    assert "fis cannot express the default 0.5" in refused("convert", "default.toml", "old.fis")
     Arbiter(normalization="sum").save(tmp_path / "sum.toml")
     assert "'sum'" in refused("convert", "sum.toml", "old.fis", "--native")
 

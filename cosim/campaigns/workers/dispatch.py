@@ -116,13 +116,13 @@ def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, No
                     continue
                 crashes += batch.alone
                 if crashes > _MAX_CRASHES:
-                    raise RunError(f"{crashes} processes crashed in a row, with any rows; what is flown is kept")
+                    raise RunError(f"{crashes} processes crashed in a row, whatever they flew; what is flown is kept")
                 refused += _retry(work, batches, batch, received)
     finally:
         for flight in under_way:  # after an error: whoever closes the executor may wait for them
             flight.cancel()
     if refused and not n_finished:
-        raise RunError("every process crashed, with any rows (killed, or out of memory)")
+        raise RunError("every process crashed, whatever it flew (killed, or out of memory)")
     yield from refused
 
 

@@ -74,7 +74,7 @@ def _span(contents: LogContents) -> tuple[float, float]:
     """Return first and last time of writing [s]."""
     ends = [_ends(source) for source in contents.sources.values() if source.count]
     if not ends:
-        raise ImportLogError("holds no sample that is read")
+        raise ImportLogError("holds no sample of a mapped quantity")
     return min(start for start, _ in ends), max(end for _, end in ends)
 
 

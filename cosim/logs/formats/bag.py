@@ -106,7 +106,7 @@ class Decoder:
         types = self._standard | self._own
         if not message.definition and message.type not in types:
             raise ImportLogError(
-                f"{message.topic} is of type {message.type}, of which the bag has no definition; expected in the map: "
+                f"{message.topic} is of type {message.type}, which the bag does not define; expected in the map: "
                 'messages = "FOLDER", which holds the .msg files of its package'
             )
         try:

@@ -79,9 +79,9 @@ def test_only_rows_that_crash_workers_are_rejected(poison):
 
 
 def test_persistent_worker_crashes_abort_without_rejecting_rows():
-    with pytest.raises(RunError, match="processes crashed in a row, with any rows"):
+    with pytest.raises(RunError, match="processes crashed in a row, whatever they flew"):
         flown(WorkerPool(range(200)))
-    with pytest.raises(RunError, match="every process crashed, with any rows"):
+    with pytest.raises(RunError, match="every process crashed, whatever it flew"):
         flown(WorkerPool(range(3)), 3)
 
 

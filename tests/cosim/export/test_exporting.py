@@ -115,7 +115,7 @@ def test_missing_library_is_named(run, tmp_path, monkeypatch, to, lacking, bring
         ("{run} --to xlsx", f"--to xlsx: expected one of {', '.join(FORMATS)}\n"),
         ("{run} --to mat", "; MATLAB reads RUN/record.parquet by parquetread\n"),
         ("nowhere --to csv", "holds no run"),
-        ("{run} --to csv --signals postion.x", "--signals postion.x: fits no signal of the run; expected such as"),
+        ("{run} --to csv --signals postion.x", "--signals postion.x: matches no signal of the run; expected such as"),
         ("{run} --to tlog --signals time", "expected without --signals, --every, --rate, since"),
         ("{run} --to tlog --every 2", "expected without --signals, --every, --rate, since"),
         ("{run} --to tlog --rate 5", "expected without --signals, --every, --rate, since"),

@@ -64,7 +64,7 @@ def test_held_values_and_gaps_are_excluded_from_samples(tmp_path):
         ({"thrust[8]": None}, "", r"no column 'thrust\[8\]'"),
         ({"quaternion.e0": None}, "", "no attitude"),
         ({"measured.velocity.u": None, "velocity.u": None}, "", "no velocity or position"),
-        ({f"thrust[{i}]": np.zeros(ROWS) for i in range(1, 9)}, "", "the thrusters rest"),
+        ({f"thrust[{i}]": np.zeros(ROWS) for i in range(1, 9)}, "", "the thrusters are never driven"),
         ({"thrust[9]": np.ones(ROWS)}, "", "more thrusters than the 8"),
         ({}, "failures = [{ thruster = 1, time = 3.0 }]", "thrusters fail"),
         ({"wrench.X": np.ones(ROWS)}, "limit = { force = 50.0 }", "has a limit or a lag"),

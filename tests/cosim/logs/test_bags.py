@@ -240,7 +240,7 @@ def test_type_without_definition_is_named(bags, columns, tmp_path, refused):
     bad.mkdir(parents=True)
     (bad / "Odometry.msg").write_text("float64 x[\n")
     for folder, what in (
-        ("", r"of type test_msgs/msg/\w+, of which the bag has no definition; .*messages"),
+        ("", r"of type test_msgs/msg/\w+, which the bag does not define; .*messages"),
         ('messages = "nowhere"\n', r"messages is '.*nowhere', expected a folder"),
         ('messages = "bad"\n', r"messages: .*Odometry\.msg is no message definition"),
     ):

@@ -140,7 +140,7 @@ def test_verb_that_needs_a_built_in_law_refuses_a_run_of_a_custom_one(facility, 
     words = [word.format(run=run.folder, out=tmp_path / "out") for word in REFUSED_OF_A_RUN[facility]]
     assert main(words) == 2
     error = capsys.readouterr().err
-    assert error.startswith("cosim: law.name is ") and "a law of one's own" in error and error.count("\n") == 1
+    assert error.startswith("cosim: law.name is ") and "a law in Python" in error and error.count("\n") == 1
     assert not (tmp_path / "out").exists()
 
 

@@ -71,7 +71,7 @@ def test_scenario_file_with_custom_law_is_loadable_but_not_runnable(scenario, na
     assert again.law.name == NAME and again.law.is_custom
     assert check_scenario(again).law == NAME
     for attempt in (lambda: run_scenario(again, tmp_path / "again"), lambda: Master(again)):
-        with pytest.raises(RunError, match=f"law.name is '{NAME}', a law of one's own"):
+        with pytest.raises(RunError, match=f"law.name is '{NAME}', a law in Python"):
             attempt()
     assert not (tmp_path / "again").exists()
     assert run_scenario(again, tmp_path / "again", report=False, law=named).summary["law"] == NAME

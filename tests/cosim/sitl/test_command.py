@@ -20,7 +20,7 @@ from tests.cosim.sitl.stand_in import NEUTRAL, StandIn
     [
         (["--vehicle", "odin"], "cosim: vehicle 'odin' has no table [autopilot], expected"),
         (["--speedup", "2"], "cosim: --speedup: expected --backend px4 with it"),
-        (["--host", "0.0.0.0"], "can be seen from other machines; --allow-remote lets it"),
+        (["--host", "0.0.0.0"], "is reachable from other machines; --allow-remote allows it"),
         (["--host", "no such host"], "cosim: --host 'no such host': is not known"),
         (["--host", "192.0.2.1", "--allow-remote"], "cosim: UDP 192.0.2.1:9002: "),
         (["--scenario", "sitll"], "did you mean 'sitl'?"),

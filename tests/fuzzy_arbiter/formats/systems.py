@@ -35,7 +35,7 @@ TIPPING = System(
     normalization="none",
 )
 
-# what only richer systems have, without what one of the formats cannot say
+# what only richer systems have, without what one of the formats cannot express
 _FIRST, _SECOND = TIPPING.inputs
 _MORE = Term("near", curve("gaussian", 5, 2)), Term("far", curve("bell", 5, 2, 3))
 _ALSO = Term("slow", curve("sigmoid", 4, -2)), Term("at", curve("singleton", 3))

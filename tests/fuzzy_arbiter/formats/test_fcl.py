@@ -110,7 +110,7 @@ def test_numbers_are_those_of_the_standard():
     ],
 )  # fmt: skip
 def test_unsupported_features_are_rejected_by_name(change, fault):
-    with pytest.raises(UnsupportedError, match=f"^fcl cannot say {fault}"):
+    with pytest.raises(UnsupportedError, match=f"^fcl cannot express {fault}"):
         writes(replace(TIPPING, **change), "fcl")
 
 

@@ -87,7 +87,7 @@ def bent():
     ],
 )
 def test_unsupported_features_are_rejected_by_name(change, fault):
-    with pytest.raises(UnsupportedError, match=f"^fis cannot say {fault}"):
+    with pytest.raises(UnsupportedError, match=f"^fis cannot express {fault}"):
         writes(replace(TIPPING, **change), "fis")
 
 
@@ -95,7 +95,7 @@ def test_conclusions_must_follow_the_output_order():
     system = prioritized(form="minimal")
     rule = Rule(system.rules[0].condition, (system.outputs[1]["low"], system.outputs[0]["high"]))
     with pytest.raises(
-        UnsupportedError, match=r"fis cannot say the conclusions of R1 .*: expected each output in the order"
+        UnsupportedError, match=r"fis cannot express the conclusions of R1 .*: expected each output in the order"
     ):
         writes(replace(system, rules=(rule,)), "fis")
 
@@ -108,5 +108,5 @@ def test_tsukamoto_ramps_follow_fuzzylite():
     assert reads(text, "fis") == system
     assert "Type='tsukamoto'" in text and "'rampmf',[0 0.25]" in text and "'rampmf',[0.6 0.4]" in text
     low = replace(y, terms=(Term("up", Shape(((0.0, 0.0), (1.0, 0.7)))),))
-    with pytest.raises(UnsupportedError, match="fis cannot say the term 'up' of 'y'"):
+    with pytest.raises(UnsupportedError, match="fis cannot express the term 'up' of 'y'"):
         writes(System((x,), (low,), ("if x is on then y is up",)), "fis")

@@ -95,7 +95,7 @@ def test_file_with_two_engines_is_rejected():
     ],
 )  # fmt: skip
 def test_unsupported_features_are_rejected_by_name(change, fault):
-    with pytest.raises(UnsupportedError, match=f"^fll cannot say {fault}"):
+    with pytest.raises(UnsupportedError, match=f"^fll cannot express {fault}"):
         writes(replace(TIPPING, **change), "fll")
 
 

@@ -125,7 +125,7 @@ def test_other_tools_give_the_same_centroids(tool, system, tmp_path, request):
     if not found():
         pytest.skip(NEEDED[tool])
     if tool == "octave" and ("wild" in request.node.name or "product" in request.node.name):
-        pytest.skip("FIS cannot say this system")
+        pytest.skip("FIS cannot express this system")
     random = np.random.default_rng(5)
     low, high = np.array([v.universe for v in system.inputs]).T
     samples = random.uniform(low, high, (10, len(low))).tolist()

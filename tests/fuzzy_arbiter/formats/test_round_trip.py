@@ -53,7 +53,7 @@ def test_any_system_round_trips_or_is_rejected_by_name(format, system):
         assert reads(writes(system, format), format) == system
     else:
         assert format in ("fcl", "fis", "fll")
-        assert fault.startswith(f"{format} cannot say the ")
+        assert fault.startswith(f"{format} cannot express the ")
         assert "\n" not in fault
 
 
