@@ -35,7 +35,11 @@ def add_verbs(verbs: Any) -> None:
     flag(
         verb, "--record-rate HZ", "maximum number of recorded rows per simulated second", float_range(1e-3, 1e6), 100.0
     )
-    flag(verb, "--autopilot ENDPOINT", "with ardupilot: its second link, such as tcp:127.0.0.1:5762; records its estimate")
+    flag(
+        verb,
+        "--autopilot ENDPOINT",
+        "with ardupilot: its second link, such as tcp:127.0.0.1:5762; records its estimate",
+    )
     flag(verb, "--dvl HZ", "rate of VISION_POSITION_DELTA to the autopilot, in simulated time", float_range(0.1, 100.0))
     flag(verb, "--dvl-latency S", "latency of these messages", float_range(0.0, 10.0), 0.1)
     flag(verb, "--dvl-dropout PART", "fraction of these messages that is lost", float_range(0.0, 1.0), 0.0)
