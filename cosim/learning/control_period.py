@@ -11,9 +11,11 @@ from controller.stack_array import Vector6
 from controller.state import State
 from controller.translator.foreign import call_c
 from cosim.results.spans import SETTLED_FOR
+from cosim.step.arbiter_inputs import write_arbiter_state
 from cosim.step.decision import control
 from cosim.step.one_step import decide, step_plant
 from cosim.step.plant_calls import PlantCalls, fmi_get
+from cosim.step.region_positions import evaluate_all
 from cosim.step.score import FlightMetrics, score_forces, score_state
 from cosim.step.sensing import fail_thrusters, measure
 from cosim.step.step_model import WORDS, Integers, StepData, StepModel
@@ -88,9 +90,9 @@ def _begin_step(model: StepModel, data: StepData, plant: PlantCalls, metrics: Fl
 
 
 def _observe(model: StepModel, data: StepData, observation: Array) -> None:
+    write_arbiter_state(data.state, data.expected, data.arbiter_state)
     R, evaluation = rotation_matrix(data.arbiter_state.quaternion), data.arbiter_evaluation
-    if model.exact:
-        evaluation = data.true_evaluation
+    evaluate_all(data, data.arbiter_state, evaluation)
     observation[:3] = R.T @ (data.goal_center + data.goal.shifts[0] - data.arbiter_state.position)
     observation[3:6] = R[2]
     observation[6:VEHICLE] = data.arbiter_state.velocity_body

@@ -179,21 +179,24 @@ def obstacle_slots(file: File) -> tuple[SecondaryRegion, ...]:
 
 def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_regions: int) -> LawSetup:
     """Check gains and period [s] of a built-in law by setting it up; a custom law has its own."""
-    setup = entry.setup
-    if entry.is_custom:
-        return setup
-    law = LAWS[entry.name]
+    if not entry.is_custom:
+        _check_builtin_law(entry.setup, through, vehicle, period, n_regions)
+    return entry.setup
+
+
+@functools.lru_cache(maxsize=16)  # in sweeps one scenario after another has the same law
+def _check_builtin_law(setup: LawSetup, through: str, vehicle: Vehicle, period: float, n_regions: int) -> None:
+    law, attitude = LAWS[setup.name], np.array(setup.desired_quaternion)
     if law.output == "thrusters" and through != "thrusters":
-        raise ScenarioError(f"actuation.through is {through!r}, expected 'thrusters': law {entry.name!r} drives them")
+        raise ScenarioError(f"actuation.through is {through!r}, expected 'thrusters': law {setup.name!r} drives them")
     model = vehicle_model(vehicle)
     if through == "thrusters":
         left = require_driven(model.thruster_matrix, model.thrust_min, model.thrust_max, model.righting_moment)
-        down = down_in_body(np.array(entry.desired_quaternion))
+        down = down_in_body(attitude)
         for axis in left:
             level = abs(down[PITCH - axis]) <= _LEVEL
             _require(level, "law.desired_quaternion", f"tilted in {AXES[axis]}", "no tilt there: no thruster drives it")
-    law.for_vehicle(model, setup.gains, np.array(entry.desired_quaternion), period, n_regions)
-    return setup
+    law.for_vehicle(model, setup.gains, attitude, period, n_regions)
 
 
 def check_mission(mission: Mission, law: LawSetup) -> None:

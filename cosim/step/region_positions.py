@@ -28,13 +28,18 @@ class RegionEvaluation(NamedTuple):
 def evaluate(model: StepModel, data: StepData, state: VehicleState, evaluation: RegionEvaluation) -> None:
     """Evaluate goal and regions at a pose: all values for a record, otherwise clearances alone."""
     if model.for_record:
-        p, e, g, c = state.position, state.quaternion, evaluation.values, evaluation.clearances
-        slopes, turns = evaluation.gradients, evaluation.rotation_gradients
-        evaluate_packed(data.goal, p, e, g[:1], slopes[:1], turns[:1], c[:1])
-        evaluate_packed(data.regions, p, e, g[1:], slopes[1:], turns[1:], c[1:])
+        evaluate_all(data, state, evaluation)
     else:
         write_clearances_of_pose(data.goal, state, evaluation.clearances[:1])
         write_clearances_of_pose(data.regions, state, evaluation.clearances[1:])
+
+
+def evaluate_all(data: StepData, state: VehicleState, evaluation: RegionEvaluation) -> None:
+    """Evaluate goal and regions at a pose, with values and gradients."""
+    p, e, g, c = state.position, state.quaternion, evaluation.values, evaluation.clearances
+    slopes, turns = evaluation.gradients, evaluation.rotation_gradients
+    evaluate_packed(data.goal, p, e, g[:1], slopes[:1], turns[:1], c[:1])
+    evaluate_packed(data.regions, p, e, g[1:], slopes[1:], turns[1:], c[1:])
 
 
 def write_clearances_of_pose(regions: PackedRegions, state: VehicleState, clearances: Array) -> None:

@@ -124,13 +124,13 @@ void actuators_rate(const Plant *plant, const Actuators *now, const Actuators *t
 
 /* ---- wrench on the body ------------------------------------------------------------------------------------ */
 
-void actuators_wrench(const Parameters *p, const Actuators *now, double tau[6])
+void actuators_wrench(const Plant *plant, const Actuators *now, double tau[6])
 {
     memcpy(tau, now->wrench, sizeof now->wrench);
     for (int j = 0; j < N_THRUSTERS; j++) {
-        const double force = p->thrust_effectiveness[j] * now->thrust[j];
+        const double force = plant->parameters.thrust_effectiveness[j] * now->thrust[j];
         if (force != 0.0) /* saves time with a direct wrench */
             for (int i = 0; i < 6; i++)
-                tau[i] += p->thruster_matrix[i][j] * force;
+                tau[i] += plant->derived.thruster_wrench[j][i] * force;
     }
 }

@@ -102,17 +102,21 @@ static Status advance(Instance *instance, double end)
     Model *m = &instance->model;
     const double before = m->time;
     const State state = m->state;
-    const Held held = m->held;
+    const bool has_clocks = m->held.next_tick < INFINITY;
+    Held held;
     double failed = 0.0;
     const Variable *invalid = NULL;
 
+    if (has_clocks)
+        held = m->held;
     if (model_advance(m, end, instance->returns_early, &failed) && !(invalid = variables_first_invalid_state(m)))
         return STATUS_OK;
 
     const double value = invalid ? *variable_real(m, invalid) : 0.0;
     m->time = before;
     m->state = state;
-    m->held = held;
+    if (has_clocks)
+        m->held = held;
     if (invalid)
         return instance_refuse(instance, "step from t = %.9g s not taken: %s becomes %.9g, outside [%.9g, %.9g]", before,
                                invalid->name, value, invalid->min, invalid->max);
@@ -156,4 +160,5 @@ static bool valid_state(const Model *m)
 const Component COMPONENT = {
     "the plant", rewind_clocks, prepare, begin, evaluate, check_step_size, advance, valid_state,
     model_apply_unlagged, model_tick, model_next_tick, model_tangent,
+    {offsetof(Model, outputs.thrust), offsetof(Model, outputs.euler), model_evaluate_forces},
 };

@@ -123,6 +123,8 @@ const char *plant_prepare(Plant *plant)
     for (int i = 0; i < N_THRUSTERS; i++) {
         d->thrust_lag[i] = actuators_thrust_lag(p, i);
         d->has_lag = d->has_lag || d->thrust_lag[i] > 0.0;
+        for (int j = 0; j < 6; j++)
+            d->thruster_wrench[i][j] = p->thruster_matrix[j][i];
     }
     d->has_current = 0;
     for (int i = 0; i < 3; i++)

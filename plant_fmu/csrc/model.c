@@ -222,18 +222,26 @@ static void euler_angles(const double e[4], double euler[3])
     euler[2] = upright ? elementary_atan2(R[1][0], R[0][0]) : elementary_atan2(-R[0][1], R[1][1]);
 }
 
+static void evaluate_forces_core(Model *m, Actuators *target)
+{
+    const Parameters *p = &m->plant.parameters;
+    Outputs *o = &m->outputs;
+    Actuators now;
+
+    actuators_target(p, &m->inputs, target, o->flags.thrust_saturated, &o->flags.wrench_saturated);
+    actuators_apply_unlagged(&m->plant, &m->state.actuators, target, &now);
+    actuators_wrench(&m->plant, &now, o->wrench);
+    for (int i = 0; i < N_THRUSTERS; i++)
+        o->thrust[i] = p->thrust_effectiveness[i] * now.thrust[i];
+}
+
 static void evaluate_core(Model *m)
 {
     const Parameters *p = &m->plant.parameters;
     Outputs *o = &m->outputs;
-    Actuators target, now;
+    Actuators target;
 
-    actuators_target(p, &m->inputs, &target, o->flags.thrust_saturated, &o->flags.wrench_saturated);
-    actuators_apply_unlagged(&m->plant, &m->state.actuators, &target, &now);
-    actuators_wrench(p, &now, o->wrench);
-    for (int i = 0; i < N_THRUSTERS; i++)
-        o->thrust[i] = p->thrust_effectiveness[i] * now.thrust[i];
-
+    evaluate_forces_core(m, &target);
     plant_derivative(&m->plant, &m->held.drift, m->time, m->state.rigid, o->wrench, o->rate.rigid);
     actuators_rate(&m->plant, &m->state.actuators, &target, &o->rate.actuators);
 
@@ -261,6 +269,16 @@ void model_evaluate(Model *m)
     coupling_apply(m, &coupled);
     evaluate_core(&coupled);
     m->outputs = coupled.outputs;
+}
+
+void model_evaluate_forces(Model *m)
+{
+    Actuators target;
+
+    if (COUPLED && coupling_is_active(m))
+        model_evaluate(m);
+    else
+        evaluate_forces_core(m, &target);
 }
 
 static int apply_unlagged_core(Model *m)

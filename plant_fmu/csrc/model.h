@@ -86,6 +86,9 @@ const char *model_prepare(Model *model);
 /* Computes the outputs. */
 void model_evaluate(Model *model);
 
+/* Computes the forces of the actuators alone: `thrust` and `wrench` of the outputs. */
+void model_evaluate_forces(Model *model);
+
 /* Returns the time of the next tick of any clock; INFINITY: none runs. */
 double model_next_tick(const Model *model);
 

@@ -213,7 +213,6 @@ static void add_scaled(const double from[N_RIGID], const double rate[N_RIGID], d
 /* Makes one fourth-order Runge-Kutta step. Checks stability at its end; the caller has checked its start. */
 static int step(const Plant *plant, const Drift *drift, double time, const Actuators *target, double h, State *state)
 {
-    const Parameters *p = &plant->parameters;
     Actuators middle;
     double tau_start[6], tau_middle[6], tau_end[6];
     double k1[N_RIGID], k2[N_RIGID], k3[N_RIGID], k4[N_RIGID], trial[N_RIGID];
@@ -221,12 +220,12 @@ static int step(const Plant *plant, const Drift *drift, double time, const Actua
     /* lags do not depend on the body, so their stages are exact, and stable for any time constant; with one much below h
      * the step integrates Simpson's mean of the forces, late by up to h/6 */
     actuators_apply_unlagged(plant, &state->actuators, target, &state->actuators);
-    actuators_wrench(p, &state->actuators, tau_start);
+    actuators_wrench(plant, &state->actuators, tau_start);
     if (plant->derived.has_lag) {
         actuators_advance(plant, &state->actuators, target, 0.5 * h, &middle);
         actuators_advance(plant, &state->actuators, target, h, &state->actuators);
-        actuators_wrench(p, &middle, tau_middle);
-        actuators_wrench(p, &state->actuators, tau_end);
+        actuators_wrench(plant, &middle, tau_middle);
+        actuators_wrench(plant, &state->actuators, tau_end);
     } else {
         memcpy(tau_middle, tau_start, sizeof tau_middle);
         memcpy(tau_end, tau_start, sizeof tau_end);

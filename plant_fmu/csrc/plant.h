@@ -95,6 +95,7 @@ typedef struct { /* constants that follow from the parameters */
     double contact_mass;             /* kg, lower bound of the mass that a force at the origin accelerates, in any direction */
     double contact_time;             /* s, bottom_time_constant, but not below the limit of the substep */
     double max_oscillation;          /* rad/s, upper bound of the oscillation by weight, buoyancy and surface */
+    double thruster_wrench[N_THRUSTERS][6]; /* thruster_matrix by thruster, so that its wrench is contiguous in memory */
     double thrust_lag[N_THRUSTERS];  /* s, time constants of the thrusters; 0: no lag */
     double wrench_lag;               /* s, time constant of the direct wrench */
     int has_lag;                     /* true: some force follows its command with a lag */
@@ -216,7 +217,7 @@ void actuators_advance(const Plant *plant, const Actuators *start, const Actuato
 void actuators_rate(const Plant *plant, const Actuators *now, const Actuators *target, Actuators *rate);
 
 /* Writes the body wrench of all actuators. */
-void actuators_wrench(const Parameters *parameters, const Actuators *now, double tau[6]);
+void actuators_wrench(const Plant *plant, const Actuators *now, double tau[6]);
 
 /* Writes the tangents of the rates, of the present forces and of their wrench. */
 void actuators_tangent(const Parameters *parameters, const Parameters *dparameters, const Inputs *inputs,

@@ -9,6 +9,7 @@
 #define COMPONENT_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 #include "model.h"
 
@@ -44,6 +45,12 @@ typedef struct {
     double (*next_tick)(const Model *model);
     /* Exact directional derivative of states and outputs along a seed, see derivatives.c. */
     void (*tangent)(const Model *model, const Model *seed, int starting, Model *tangent);
+
+    /* Computes the outputs at offsets `begin` to `end` in the model, which costs less than all. NULL: all at once. */
+    struct {
+        size_t begin, end;
+        void (*evaluate)(Model *model);
+    } forces;
 } Component;
 
 extern const Component COMPONENT;

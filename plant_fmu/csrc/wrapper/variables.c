@@ -82,12 +82,20 @@ Status instance_get_reals(Instance *instance, const unsigned references[], size_
 {
     if ((N_ARRAYS > 0 || n != n_values) && instance_check_count(instance, TYPE_REAL, references, n, n_values) != STATUS_OK)
         return STATUS_ERROR;
+    const bool may_be_partial = instance->mode == MODE_STEPPING && !instance->unprepared && COMPONENT.forces.evaluate;
+    bool has_forces = false;
     for (size_t i = 0; i < n; i++) {
         if (references[i] >= N_VARIABLES || VARIABLES[references[i]].type != TYPE_REAL)
             return check_reference(instance, TYPE_REAL, references[i]);
         const Variable *v = &VARIABLES[references[i]];
-        if (instance->outdated && v->role == OUTPUT && instance_update(instance) != STATUS_OK)
-            return STATUS_ERROR;
+        if (instance->outdated && v->role == OUTPUT) {
+            if (may_be_partial && v->offset >= COMPONENT.forces.begin && v->offset < COMPONENT.forces.end) {
+                if (!has_forces)
+                    COMPONENT.forces.evaluate(&instance->model);
+                has_forces = true;
+            } else if (instance_update(instance) != STATUS_OK)
+                return STATUS_ERROR;
+        }
         for (const Variable *element = v; element < v + v->size; element++)
             *values++ = *variable_real(&instance->model, element);
     }
@@ -119,6 +127,13 @@ static unsigned modes_to_set(Role role, Interface kind)
     default:
         return start | MODE_STEPPING | MODE_EVENT;
     }
+}
+
+/* True for a value that needs neither clipping nor a closer look, as most do. */
+static bool is_within(const Instance *instance, const Variable *v, double value)
+{
+    return v->role == INPUT && instance->mode == MODE_STEPPING && v->type == TYPE_REAL && value >= v->min && value <= v->max &&
+           isfinite(value);
 }
 
 /* How far outside of its range a value may be, relative to the bound unless that is 0: it is clipped. */
@@ -161,8 +176,9 @@ Status instance_set_reals(Instance *instance, const unsigned references[], size_
     const double *value = values;
     for (size_t i = 0; i < n; i++) { /* all or none */
         const unsigned size = references[i] < N_VARIABLES ? VARIABLES[references[i]].size : 1;
-        for (unsigned k = 0; k < size; k++)
-            if (check_value(instance, TYPE_REAL, references[i] + k, *value++) != STATUS_OK)
+        for (unsigned k = 0; k < size; k++, value++)
+            if (!(references[i] + k < N_VARIABLES && is_within(instance, &VARIABLES[references[i] + k], *value)) &&
+                check_value(instance, TYPE_REAL, references[i] + k, *value) != STATUS_OK)
                 return STATUS_ERROR;
     }
     for (size_t i = 0; i < n; i++)

@@ -60,4 +60,5 @@ static bool valid_state(const Model *m)
 
 const Component COMPONENT = {
     "the arbiter", rewind_ticks, prepare, NULL, NULL, check_step_size, advance, valid_state, NULL, NULL, NULL, NULL,
+    {0, 0, NULL},
 };
