@@ -47,7 +47,13 @@ _MIN_UNCERTAINTY = 0.05  # m, position error of an autopilot that no measurement
 # Errors of an autopilot's estimate are slow: its velocity may be off by some cm/s for a minute, its position has no
 # white noise. With a smaller velocity noise, the law's position would shift by (velocity error) / (rate of its filter).
 # Innovations stay biased, so they are no reason to let disturbances drift.
-_NOISE_GAINS = {"law.gains.position_noise": 0.01, "law.gains.velocity_noise": 0.05, "law.gains.max_drift": 1.0}
+# Their drag and current are therefore poorly told apart: what is missing to stay in the goal comes from an integral.
+_NOISE_GAINS = {
+    "law.gains.position_noise": 0.01,
+    "law.gains.velocity_noise": 0.05,
+    "law.gains.max_drift": 1.0,
+    "law.gains.integral": 0.2,
+}
 # the autopilot allocates the forces: a thruster's force is not the one that the law commanded
 _WITHOUT_ISOLATION = {"law.gains.failure_threshold": 0.0}
 # the autopilot's attitude loop makes the moments: a law that estimates restoring moments, or the effectiveness of each

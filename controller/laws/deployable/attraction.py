@@ -11,6 +11,9 @@ from controller.linear_algebra import norm
 from controller.stack_array import Vector3, zeros
 
 _LOOKAHEAD = 0.4  # m, lookahead distance along the path
+_SLOW = 0.3  # m/s, desired speed below which the velocity's error is integrated
+_FORGETTING = 5.0  # s, time constant at which its integral is forgotten above that
+_LARGEST = 0.5  # largest integral, as a fraction of the acceleration
 _SLOWEST_CORNER = 0.25  # speed at corners of 120 degrees and more, as a fraction of the full speed
 
 
@@ -53,3 +56,16 @@ def desired_acceleration(desired: Vector3, velocity: Vector3, gains: DeployableG
     acceleration = gains.velocity_bandwidth * (desired - velocity)
     size = norm(acceleration)
     return gains.acceleration / size * acceleration if size > gains.acceleration else acceleration
+
+
+def integrate_error(
+    integral: Vector3, desired: Vector3, velocity: Vector3, gains: DeployableGains, period: float
+) -> None:
+    """Integrate the error of a slow velocity into an acceleration [m/s2], NED: a constant force that is not known."""
+    if norm(desired) < _SLOW:
+        integral += period * gains.integral * (desired - velocity)
+    else:
+        integral *= 1.0 - min(period / _FORGETTING, 1.0)
+    size, largest = norm(integral), _LARGEST * gains.acceleration
+    if size > largest:
+        integral *= largest / size

@@ -27,7 +27,7 @@ from controller.laws.deployable import (
 )
 from controller.laws.deployable.actuator_lag import predict_state
 from controller.laws.deployable.attitude import empty_attitude
-from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
+from controller.laws.deployable.attraction import desired_acceleration, desired_velocity, integrate_error
 from controller.laws.deployable.barrier import (
     Motion,
     RegionObservation,
@@ -156,7 +156,8 @@ def step(
     # desired wrench
     observe_regions(memory.observation, regions_ahead, ahead.position, ahead.quaternion, ahead.velocity)
     fraction = period / (period + gains.smoothing)
-    by_thrust = desired_acceleration(desired, velocity, gains) - free[:3]
+    integrate_error(memory.integral, desired, velocity, gains, period)
+    by_thrust = desired_acceleration(desired, velocity, gains) + memory.integral - free[:3]
     memory.filtered_acceleration += fraction * (by_thrust - memory.filtered_acceleration)
     force = dynamics.mass[:3, :3] @ (R_ahead.T @ memory.filtered_acceleration)
     deep = min(clearance_at(goal_ahead, 0, memory.plan.path[memory.plan.points - 1]), gains.depth)

@@ -227,6 +227,14 @@ def test_restoring_force_and_current_are_estimated():
     assert [flight.report(f"current.{a}")[-1] for a in "xy"] == pytest.approx([-0.2, 0.15], abs=0.05)
 
 
+@pytest.mark.medium
+@pytest.mark.parametrize(("integral", "missing"), [(0.0, (0.03, 0.2)), (0.2, (-0.02, 0.02))])
+def test_an_integral_makes_up_for_a_current_that_is_not_estimated(integral, missing):
+    gains = DeployableGains(current_bound=1e-3, drag_estimation=0.0, integral=integral)
+    flight = fly([], gains=gains, plant={"current.x": -0.5})
+    assert missing[0] <= gains.depth - flight.clearance(flight.goal)[-1] <= missing[1]
+
+
 def angle_to(flight, feature):
     """Return the angle between the body's x axis and the line to a feature, by NumPy alone."""
     e0, e1, e2, e3 = flight.quaternion.T
