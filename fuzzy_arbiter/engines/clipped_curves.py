@@ -325,10 +325,10 @@ def with_crossings(edges: Array, shapes: Sequence[Membership]) -> Array:
     starts, ends, pairs = [np.zeros(0)], [np.zeros(0)], [np.zeros((0, 2), dtype=np.intp)]
     for i, j in itertools.combinations(range(len(shapes)), 2):
         margin = degrees[i] - degrees[j]
-        changes = (margin[:, 1:] >= 0.0) != (margin[:, :-1] >= 0.0)
-        changes &= np.maximum(np.abs(margin[:, 1:]), np.abs(margin[:, :-1])) > _MIN_MARGIN
-        starts.append(positions[:, :-1][changes])
-        ends.append(positions[:, 1:][changes])
+        changes = (margin[1:] >= 0.0) != (margin[:-1] >= 0.0)
+        changes &= np.maximum(np.abs(margin[1:]), np.abs(margin[:-1])) > _MIN_MARGIN
+        starts.append(positions[:-1][changes])
+        ends.append(positions[1:][changes])
         pairs.append(np.tile([i, j], (len(ends[-1]), 1)))
     one, other = np.concatenate(pairs).T
 
@@ -344,7 +344,7 @@ def _lines(edges: Array, shapes: Sequence[Membership], ordered: bool) -> tuple[I
     """Return the slots of each panel, the highest first; their lines; the keys of these; and the area's error."""
     starts, ends = edges[:-1], edges[1:]
     half = (ends - starts) / 2
-    nodes, positions = (points_of(starts, ends, points) for points in (_NODES, _INNER_TABLE))
+    nodes, positions = (points_of(starts, ends, points).T for points in (_NODES, _INNER_TABLE))
     at_nodes, degrees = (_degrees(shapes, x) for x in (nodes, positions))
     series = at_nodes @ _SERIES @ _AS_POWERS  # (shapes, panels, powers)
     table = series @ _powers(_INNER_TABLE, _ORDER)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial import legendre
 
-from fuzzy_arbiter.engines.panels import ANALYSIS, INNER, NODES, WEIGHTS, Indices, Panels, points_of, roots
+from fuzzy_arbiter.engines.panels import ANALYSIS, INNER, NODES, ORDER, WEIGHTS, Indices, Panels, points_of, roots
 from fuzzy_arbiter.shapes import Array
 from fuzzy_arbiter.terms.curves import Curve
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 HEIGHT_RATIO = 1.0 - 1e-12  # quotient of heights above which they count as equal
 _MIN_DISTANCE = 1e-9  # positions that are nearer than this fraction of the universe count as one
-_CLOSER = 2  # times that many points narrow the search for a maximum
-_DENSE = np.linspace(-1.0 + 1e-12, 1.0 - 1e-12, 33)  # these points in a panel, on its side of a jump
+_DENSE = np.linspace(-1.0, 1.0, 17)  # points of a panel between which its slope has one zero at most
+_DENSE_POLYNOMIALS = legendre.legvander(_DENSE, ORDER - 2)
 _LIKELY = 0.95  # minimum height at the points around a maximum, as a fraction of the maximum at any point
 
 
@@ -26,8 +26,8 @@ def of_points(quad: Quadrature, cuts: Array) -> float:
     """Return the mean of the singletons, weighted by their heights: what very narrow terms of one width tend to."""
     joined = [
         (shape.parameters[0], implication.number(cut, shape.height))
-        for cut, implication, t in zip(cuts.tolist(), quad.implications, quad._term, strict=True)
-        if isinstance(shape := quad._shapes[t], Curve) and shape.kind == "singleton"
+        for cut, implication, t in zip(cuts.tolist(), quad.implications, quad.terms, strict=True)
+        if isinstance(shape := quad.shapes[t], Curve) and shape.kind == "singleton"
     ]
     weight = sum(height for _, height in joined)
     return sum(position * height for position, height in joined) / weight if weight > 0.0 else math.nan
@@ -61,7 +61,7 @@ def bisectors(samples: Samples, panels: Panels, totals: Array) -> Array:
         row = inside[which]
         start = starts[panel[row]]
         heights = samples.heights(points_of(start, x, NODES), row).height
-        return np.asarray((heights * WEIGHTS).sum(axis=-1) * (x - start) / 2 - missing[row])
+        return np.asarray(WEIGHTS @ heights * (x - start) / 2 - missing[row])
 
     middles, has_root = roots(lacking, starts[panel[inside]], ends[panel[inside]], samples.quad.precision)
     result[inside[has_root]] = middles[has_root]
@@ -71,14 +71,14 @@ def bisectors(samples: Samples, panels: Panels, totals: Array) -> Array:
 def of_maximum(samples: Samples, panels: Panels, kind: str) -> Array:
     """Return for each sample the mean, smallest or largest position of the maximum height."""
     quad, n = samples.quad, samples.n
-    tops = panels.heights.max(axis=1)
+    tops = panels.heights.max(axis=0)
     max_heights = np.zeros(n)
     np.maximum.at(max_heights, panels.rows, tops)
     candidates = [(np.repeat(np.arange(n), len(quad.edges)), np.tile(quad.edges, n))]
     high = np.flatnonzero(~panels.flat & (tops >= _LIKELY * max_heights[panels.rows]))
     if len(high):
         tall = panels.chosen(high)
-        best = points_of(tall.starts, tall.ends, NODES)[np.arange(len(high)), tall.heights[:, INNER].argmax(axis=1)]
+        best = points_of(tall.starts, tall.ends, NODES)[tall.heights[INNER].argmax(axis=0), np.arange(len(high))]
         # a height that jumps at an end reaches its maximum just inside
         inset = np.minimum(4.0 * quad.precision, (tall.ends - tall.starts) * 1e-3)
         ends = (tall.starts, tall.ends, tall.starts + inset, tall.ends - inset)
@@ -117,26 +117,21 @@ def positions_of_maximum(
 
 def _turning(samples: Samples, panels: Panels) -> tuple[Indices, Array]:
     """Return samples and positions where the height within a panel turns from rising to falling."""
-    rows, starts, ends = panels.rows, panels.starts, panels.ends
-    for _ in range(_CLOSER):
-        positions = points_of(starts, ends, _DENSE)
-        heights = samples.heights(positions, rows).height
-        around = np.pad(heights, ((0, 0), (1, 1)))
-        items, index = np.nonzero((heights >= around[:, :-2]) & (heights > around[:, 2:]))
-        rows, starts, ends = (
-            rows[items],
-            positions[items, np.maximum(index - 1, 0)],
-            positions[items, np.minimum(index + 1, 32)],
-        )
-        best, height = positions[items, index], heights[items, index]
-    slope = legendre.legder(
-        np.einsum("pj,kj->kp", samples.heights(points_of(starts, ends, NODES), rows).height, ANALYSIS)
-    )
-    bend = legendre.legder(slope)
-    x = np.zeros(len(rows))
-    for _ in range(6):  # Newton's method
-        with np.errstate(divide="ignore", invalid="ignore"):
-            step = legendre.legval(x, slope, tensor=False) / legendre.legval(x, bend, tensor=False)
-        x = np.clip(np.where(np.isfinite(step), x - step, x), -1.0, 1.0)
-    positions = points_of(starts, ends, x[:, None])[:, 0]
-    return rows, np.where(samples.heights(positions, rows).height >= height * HEIGHT_RATIO, positions, best)
+    rows, starts, ends, heights = panels.rows, panels.starts, panels.ends, panels.heights[INNER]
+    for near in (
+        0.1,
+        0.0,
+    ):  # a part of the panel around the turn, which a polynomial meets more closely; then that turn
+        slope = legendre.legder(ANALYSIS @ heights)
+        slopes = _DENSE_POLYNOMIALS @ slope
+        index, items = np.nonzero((slopes[:-1] > 0.0) & (slopes[1:] <= 0.0))
+        slope, low, high = slope[:, items], _DENSE[index], _DENSE[index + 1]
+        bend, x = legendre.legder(slope), (low + high) / 2
+        for _ in range(6):  # Newton's method
+            with np.errstate(divide="ignore", invalid="ignore"):
+                step = legendre.legval(x, slope, tensor=False) / legendre.legval(x, bend, tensor=False)
+            x = np.clip(np.where(np.isfinite(step), x - step, x), low, high)
+        rows, sides = rows[items], np.clip([x - near, x + near], -1.0, 1.0)
+        starts, ends = points_of(starts[items], ends[items], sides)
+        heights = samples.heights(points_of(starts, ends, NODES), rows).height if near else heights
+    return rows, starts

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +24,10 @@ INNER = slice(1, -1)  # the nodes among the points
 ANALYSIS = (np.arange(ORDER)[:, None] + 0.5) * legendre.legvander(NODES, ORDER - 1).T * WEIGHTS
 NARROWEST = 1e-14  # least width of a panel that is divided, as a fraction of the universe's maximum number
 _STATIC = 1e-13  # tolerance of a panel of one term, as a fraction of the term's area
-_AT_ENDS = legendre.legvander(POINTS[[0, -1]], ORDER - 1).T  # the series' polynomials at the outer points
+# factors of the values at the nodes: of mean and lever, the series' last terms, and its values at the outer points
+_FACTORS = np.vstack(
+    [WEIGHTS, WEIGHTS * NODES, ANALYSIS[4:], legendre.legvander(POINTS[[0, -1]], ORDER - 1) @ ANALYSIS]
+)
 _REST = 8.0  # greatest rest of a smooth function's series at an end, as a multiple of its last terms
 _MAX_PANELS = 4096
 _MAX_HALVINGS = 60
@@ -37,34 +39,34 @@ class Panels(NamedTuple):
     rows: Indices  # sample of each panel
     starts: Array
     ends: Array
-    heights: Array  # at the points of each panel
     flat: Mask  # True where the height is constant
     areas: Array
     moments: Array  # about the universe's start
+    heights: Array  # at the points of each panel, shape (points, panels)
 
     def chosen(self, which: Mask | Indices) -> Panels:
         """Return some of the panels."""
-        return Panels(*map(itemgetter(which), self))
+        return Panels(*(column[..., which] for column in self))
 
 
 def points_of(starts: Array, ends: Array, at: Array = POINTS) -> Array:
-    """Return the points of each panel, shape (panels, points)."""
-    return np.asarray(((starts + ends) / 2)[:, None] + ((ends - starts) / 2)[:, None] * at)
+    """Return the points of each panel, shape (points, panels); `at` is that of (points,) or of (points, panels)."""
+    places = at[:, None] if at.ndim == 1 else at
+    return np.asarray((starts + ends) / 2 + (ends - starts) / 2 * places)
 
 
-def mean_errors(values: Array) -> Array:
-    """Estimate the error of each panel's mean, for values at `POINTS`, by the Legendre series through the nodes."""
+def integrals(values: Array) -> tuple[Array, Array, Array]:
+    """Return the area and the moment of panels from -1 to 1 for values at `POINTS`, and an estimate of errors."""
     # A series whose terms fall by r from the degrees 4 and 5 to 6 and 7 falls by r^5 until degree 16, the first that
     # the nodes do not integrate. A series that does not reach the values at the ends hides a steep part between an end
     # and the node beside it.
-    series = np.einsum("pj,kj->pk", np.ascontiguousarray(values[:, INNER]), ANALYSIS)
-    sizes = np.abs(series[:, 4:])
-    before, last = sizes[:, 0] + sizes[:, 1], sizes[:, 2] + sizes[:, 3]
+    area, moment, *series, first, last = _FACTORS @ values[INNER]
+    before, rest = np.abs(series[0]) + np.abs(series[1]), np.abs(series[2]) + np.abs(series[3])
     with np.errstate(divide="ignore", invalid="ignore"):
-        decay = np.where(last < before, last / before, 1.0)
-    off = np.abs(series @ _AT_ENDS - values[:, [0, -1]]).max(axis=1)
-    hidden = np.where(off > _REST * last, off * (1.0 - NODES[-1]) / 2, 0.0)
-    return np.asarray(np.maximum(last * decay**5, hidden))
+        decay = np.where(rest < before, rest / before, 1.0)
+    off = np.maximum(np.abs(first - values[0]), np.abs(last - values[-1]))
+    hidden = np.where(off > _REST * rest, off * (1.0 - NODES[-1]) / 2, 0.0)
+    return area, moment, np.maximum(rest * decay**5, hidden)
 
 
 def smooth_panels(universe: tuple[float, float], shapes: Sequence[Membership]) -> Array:
@@ -78,10 +80,9 @@ def smooth_panels(universe: tuple[float, float], shapes: Sequence[Membership]) -
         positions = points_of(starts, ends)
         rough = np.zeros(len(starts), dtype=bool)
         for k, shape in enumerate(shapes):
-            values = shape.of_many(positions.ravel()).reshape(positions.shape)
-            widths = ends - starts
-            areas[k] = max(areas[k], float(((values[:, INNER] * WEIGHTS).sum(axis=-1) * widths).sum()) / 2)
-            rough |= mean_errors(values) * widths > _STATIC * areas[k]
+            sums, _, errors = integrals(shape.of_many(positions.ravel()).reshape(positions.shape))
+            areas[k] = max(areas[k], float(sums @ (ends - starts)) / 2)
+            rough |= errors * (ends - starts) > _STATIC * areas[k]
         rough &= ends - starts > narrowest
         if not rough.any() or len(edges) + rough.sum() > _MAX_PANELS:
             break
@@ -101,7 +102,7 @@ def constant_panels(shape: Membership, middles: Array, degrees: Array) -> Mask:
     if isinstance(shape, Curve):
         pieces = [isinstance(tree, float) for tree in shape.trees]
         return np.array(pieces)[np.searchsorted(shape.ends, middles)]
-    return np.asarray(np.ptp(degrees, axis=1) == 0.0)
+    return np.asarray(np.ptp(degrees, axis=0) == 0.0)
 
 
 def dividing(items: Indices, positions: Array, starts: Array, ends: Array) -> tuple[Indices, Array, Array]:
@@ -120,8 +121,8 @@ def dividing(items: Indices, positions: Array, starts: Array, ends: Array) -> tu
 def lowest_between(values: Array) -> tuple[Mask, Array]:
     """Find panels where a positive function may fall to 0 between its points; return where it comes closest to 0."""
     # A parabola through each three neighboring points shows where the function turns, and how far below the points.
-    x0, x1, x2 = POINTS[:-2], POINTS[1:-1], POINTS[2:]
-    v0, v1, v2 = values[:, :-2], values[:, 1:-1], values[:, 2:]
+    x0, x1, x2 = POINTS[:-2, None], POINTS[1:-1, None], POINTS[2:, None]
+    v0, v1, v2 = values[:-2], values[1:-1], values[2:]
     slope = (v1 - v0) / (x1 - x0)
     bend = ((v2 - v1) / (x2 - x1) - slope) / (x2 - x0)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -129,9 +130,8 @@ def lowest_between(values: Array) -> tuple[Mask, Array]:
         minimum = v0 + slope * (turn - x0) + bend * (turn - x0) * (turn - x1)
         rise = np.maximum(v0, v2) - minimum
         near = (bend > 0.0) & (x0 < turn) & (turn < x2) & (minimum < rise / 2) & (rise > 1e-12)
-    minimum = np.where(near, minimum, np.inf)
-    best = minimum.argmin(axis=1)
-    return near.any(axis=1), np.take_along_axis(turn, best[:, None], axis=1)[:, 0]
+    best = np.where(near, minimum, np.inf).argmin(axis=0)
+    return near.any(axis=0), np.take_along_axis(turn, best[None], axis=0)[0]
 
 
 def roots(

@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -21,14 +22,13 @@ from fuzzy_arbiter.engines.panels import (
     INNER,
     NARROWEST,
     POINTS,
-    WEIGHTS,
     Indices,
     Mask,
     Panels,
     constant_panels,
     dividing,
+    integrals,
     lowest_between,
-    mean_errors,
     points_of,
     roots,
     smooth_panels,
@@ -43,33 +43,33 @@ _TOLERANCE = 1e-12  # tolerance of each panel, as a fraction of the area
 _ROUNDS = 60  # maximum number of divisions of a panel
 _MAX_PANELS = 4000  # maximum number of panels of a sample that are divided at a time
 _MAX_TABLE = 2**25  # maximum number of degrees at the points of the terms' panels
-_BLOCK = 2**17  # number of degrees that are computed at a time
+_BLOCK = 2**19  # number of degrees that are computed at a time
 _TIED = 1e-12  # sides of a comparison count as equal if their quotient differs from 1 by less
 _NOISE = 4e-16  # error of a height by rounding, as a fraction of it, or of 1 where it is a difference from 1
+MAXIMA = ("mom", "som", "lom")
 _CLOSE = 0.2  # distance of two sides at which they may pass each other between two points, as a fraction of the greater
 
 
-class Sides(NamedTuple):
-    """Both sides of a comparison in a formula by which a slot is implied or joined."""
-
-    slot: int
-    turns: bool  # False if their difference only rises or only falls in a panel
-    left: Array
-    right: Array
-
-
 class Joined(NamedTuple):
-    """Heights of the slots at some positions, and of their join."""
+    """Heights of slots at some positions, and of their join."""
 
-    degrees: list[Array]  # of each term
+    degrees: list[Array]  # of each slot's term
     implied: list[Array]  # of each slot
     joins: list[Array]  # of each slot and those before it
-    sides: list[Sides]
 
     @property
     def height(self) -> Array:
         """Height of the join of all slots."""
         return self.joins[-1]
+
+
+class Comparison(NamedTuple):
+    """A comparison in a formula by which a slot is implied or joined."""
+
+    slot: int
+    index: int  # among those of the formula
+    joins: bool  # True if it is of the join
+    turns: bool  # False if the difference of its sides only rises or only falls in a panel
 
 
 class Quadrature(Defuzzifier):
@@ -78,41 +78,47 @@ class Quadrature(Defuzzifier):
     def __init__(self, output: Output, slots: Sequence[Slot]) -> None:
         self.output = output
         used = sorted({slot.term for slot in slots})
-        self._term = [used.index(slot.term) for slot in slots]
-        self._shapes = [s for j in used if isinstance(s := output.terms[j].shape, Membership)]
+        self.terms = [used.index(slot.term) for slot in slots]
+        self.shapes = [s for j in used if isinstance(s := output.terms[j].shape, Membership)]
         self.implications = [T_NORMS[slot.implication] for slot in slots]
         self._join = AGGREGATIONS[output.aggregation]
         self.is_max = output.aggregation == "max"
         self.low, self.width = output.universe[0], output.universe[1] - output.universe[0]
         self.precision = 4e-16 * max(abs(self.low), abs(output.universe[1]))
-        self.edges = smooth_panels(output.universe, self._shapes)
+        self.edges = smooth_panels(output.universe, self.shapes)
         positions = points_of(self.edges[:-1], self.edges[1:])
-        if positions.size * len(self._shapes) > _MAX_TABLE:
+        if positions.size * len(self.shapes) > _MAX_TABLE:
             raise EngineError(
-                f"output {output.name!r}: its {len(self._shapes)} terms need {len(positions)} panels, "
+                f"output {output.name!r}: its {len(self.shapes)} terms need {len(positions)} panels, "
                 f"expected terms and panels of a product of at most {_MAX_TABLE // len(POINTS)}"
             )
         middles = (self.edges[:-1] + self.edges[1:]) / 2
         self._constant = [
             constant_panels(shape, middles, shape.of_many(positions.ravel()).reshape(positions.shape))
-            for shape in self._shapes
+            for shape in self.shapes
         ]
         self._drastic = output.aggregation == "drastic_sum" or any(s.implication == "drastic_product" for s in slots)
-        self._table = self._all_degrees(positions)
+        table = [self._degrees(t, positions.ravel()).reshape(positions.shape) for t in range(len(self.shapes))]
+        self.table = [table[t] for t in self.terms]  # degrees of each slot's term at the points of the panels
         words = [slot.implication for slot in slots]
         self.noise = _NOISE if "bounded_difference" in words else 0.0
         self._clips = [word in ("min", "nilpotent_minimum") for word in words]
-        self._turns = [not self._shapes[t].monotonic for t in self._term]
+        self.comparisons = [
+            Comparison(slot, k, joins, joins or not self.shapes[t].monotonic)
+            for slot, (norm, t) in enumerate(zip(self.implications, self.terms, strict=True))
+            for operator, joins in ((norm, False), *([(self._join, True)] if slot else []))
+            for k in range(len(operator.sides(0.5, 0.5)))
+        ]
         self.method = self._method(words)
 
     def _method(self, words: Sequence[str]) -> str:
-        if any(isinstance(shape, Formula) for shape in self._shapes):
+        if any(isinstance(shape, Formula) for shape in self.shapes):
             return "adaptive quadrature, without a bound, as nothing is known of a formula between its points"
         if self.output.defuzzifier == "bisector":
             return f"adaptive quadrature, halves of the area within {BOUND:g} of it, and to rounding of the position"
         if self.output.defuzzifier != "centroid":
             return "search for the maximum height, without a bound: a small error of it may move the position far"
-        polynomial = all(shape.polynomial for shape in self._shapes) and set(words) <= {"min", "prod"}
+        polynomial = all(shape.polynomial for shape in self.shapes) and set(words) <= {"min", "prod"}
         if polynomial and self.output.aggregation in ("max", "probor", "sum", "bounded_sum"):
             return "integrals of polynomials, to rounding"
         return f"adaptive quadrature, within {centroid_bound(self.output):g} of the universe's width"
@@ -120,56 +126,58 @@ class Quadrature(Defuzzifier):
     def values(self, cuts: Array, inputs: Array) -> Array:
         """Return the output's values for many samples; cuts (slots, n), returns (n,)."""
         count = max(1, _BLOCK // (len(POINTS) * len(self.edges) * max(1, len(cuts))))
-        result = np.empty(cuts.shape[1])
-        for start in range(0, len(result), count):
-            result[start : start + count] = Samples(self, cuts[:, start : start + count]).values()
-        return result
+        blocks = (cuts[:, start : start + count] for start in range(0, cuts.shape[1], count))
+        return np.concatenate([np.zeros(0), *(Samples(self, block).values() for block in blocks)])
 
-    def joined(self, degrees: list[Array], cuts: Array) -> Joined:
-        """Return heights of the slots and of their join, for degrees of the terms and cuts of the slots."""
-        result = Joined(degrees, [], [], [])
-        height = np.zeros(degrees[0].shape)
-        for i, (implication, cut, t) in enumerate(zip(self.implications, cuts, self._term, strict=True)):
-            implied = implication.array(cut, degrees[t])
-            result.sides.extend(Sides(i, self._turns[i], *sides) for sides in implication.sides(cut, degrees[t]))
-            if i:
-                result.sides.extend(Sides(i, True, *sides) for sides in self._join.sides(height, implied))
-            height = self._join.array(height, implied)
-            result.implied.append(implied)
-            result.joins.append(height)
-        return result
+    def joined(self, degrees: Sequence[Array], cuts: Array) -> Joined:
+        """Return heights of slots and of their join, for the degrees of their terms and their cuts."""
+        implied = [
+            implication.array(cut, each)
+            for implication, cut, each in zip(self.implications, cuts, degrees, strict=False)
+        ]
+        return Joined(list(degrees), implied, list(itertools.accumulate(implied, self._join.array)))
 
-    def heights(self, positions: Array, cuts: Array) -> Joined:
-        """Return heights at positions, an array of any shape, for cuts of the same shape."""
-        return self.joined(self._all_degrees(positions), cuts)
-
-    def _all_degrees(self, positions: Array) -> list[Array]:
-        return [self._degrees(t, positions.ravel()).reshape(positions.shape) for t in range(len(self._shapes))]
+    def heights(self, positions: Array, cuts: Array, count: int | None = None) -> Joined:
+        """Return heights of all slots or of the first ones at positions, for cuts that broadcast with these."""
+        terms = self.terms[:count]
+        known = {t: self._degrees(t, positions.ravel()).reshape(positions.shape) for t in set(terms)}
+        return self.joined([known[t] for t in terms], cuts)
 
     def _degrees(self, t: int, positions: Array) -> Array:
         """Return degrees of a term; where operators jump at 0 and 1, those that only round to these are within them."""
-        degrees = self._shapes[t].of_many(positions)
+        degrees = self.shapes[t].of_many(positions)
         if not self._drastic:
             return degrees
         panels = np.clip(np.searchsorted(self.edges, positions) - 1, 0, len(self.edges) - 2)
         within = ~self._constant[t][panels] & (self.edges[panels + 1] != positions) & (positions != self.low)
         return np.where(within, np.clip(degrees, 1e-300, 1.0 - 2.0**-53), degrees)
 
-    def tabled(self, rows: Indices, panels: Indices, cuts: Array) -> Joined:
-        """Return heights at the points of the terms' own panels."""
-        return self.joined([table[panels] for table in self._table], cuts[:, rows][..., None])
+    def sides(self, one: Comparison, joined: Joined, cuts: Array) -> tuple[Array, Array]:
+        """Return both sides of a comparison."""
+        if one.joins:
+            return self._join.sides(joined.joins[one.slot - 1], joined.implied[one.slot])[one.index]
+        return self.implications[one.slot].sides(cuts[one.slot], joined.degrees[one.slot])[one.index]
+
+    def margin(self, one: Comparison, positions: Array, cuts: Array) -> Array:
+        """Return the difference of both sides of a comparison at positions."""
+        if one.joins:
+            left, right = self.sides(one, self.heights(positions, cuts, one.slot + 1), cuts)
+        else:
+            degrees = self._degrees(self.terms[one.slot], positions)
+            left, right = self.implications[one.slot].sides(cuts[one.slot], degrees)[one.index]
+        return np.asarray(left - right)
 
     def flat(self, joined: Joined, cuts: Array, panels: Indices) -> Mask:
         """Return True for panels of constant height."""
         if not self.is_max:
-            return np.asarray(np.ptp(joined.height, axis=1) <= 4e-16 * joined.height.max(axis=1))
-        middles = np.array([implied[:, 4] for implied in joined.implied])
+            return np.asarray(np.ptp(joined.height, axis=0) <= 4e-16 * joined.height.max(axis=0))
+        highest = np.array([implied[4] for implied in joined.implied]).argmax(axis=0)
         result = np.zeros(len(panels), dtype=bool)
-        for i, t in enumerate(self._term):
+        for i, t in enumerate(self.terms):
             constant = self._constant[t][panels]
             if self._clips[i]:
-                constant = constant | (joined.degrees[t][:, 4] > cuts[i, :, 0])
-            result |= constant & (middles.argmax(axis=0) == i)
+                constant = constant | (joined.degrees[i][4] > cuts[i])
+            result |= constant & (highest == i)
         return result
 
 
@@ -188,7 +196,7 @@ class Samples:
     def values(self) -> Array:
         """Return the value of each sample, shape (n,)."""
         panels, kind, low = self.panels(), self.quad.output.defuzzifier, self.quad.low
-        if kind in ("mom", "som", "lom"):
+        if kind in MAXIMA:
             return defuzzification.of_maximum(self, panels, kind)
         areas = np.bincount(panels.rows, panels.areas, self.n).astype(np.float64)
         some = areas > 0.0
@@ -204,9 +212,8 @@ class Samples:
         return result
 
     def heights(self, positions: Array, rows: Indices) -> Joined:
-        """Return heights at positions of some samples, shape (rows,) or (rows, points)."""
-        cuts = self.cuts[:, rows]
-        return self.quad.heights(positions, cuts if positions.ndim == 1 else cuts[..., None])
+        """Return heights at positions of some samples, shape (rows,) or (points, rows)."""
+        return self.quad.heights(positions, self.cuts[:, rows])
 
     def panels(self) -> Panels:
         """Return panels in which the joined terms are smooth."""
@@ -215,26 +222,29 @@ class Samples:
         starts, ends = quad.edges[base], quad.edges[base + 1]
         narrowest = NARROWEST * max(abs(quad.low), abs(quad.low + quad.width), quad.width)
         for turn in range(_ROUNDS + 1):
-            positions = points_of(starts, ends)
-            joined = self.heights(positions, rows) if turn else quad.tabled(rows, base, self.cuts)
-            inner, half = np.ascontiguousarray(joined.height[:, INNER]), (ends - starts) / 2
-            areas = (inner * WEIGHTS).sum(axis=-1) * half
-            moments = (inner * WEIGHTS * (positions[:, INNER] - quad.low)).sum(axis=-1) * half
+            half, cuts, positions = (ends - starts) / 2, self.cuts[:, rows], points_of(starts, ends)
+            joined = (
+                quad.heights(positions, cuts) if turn else quad.joined([np.tile(t, self.n) for t in quad.table], cuts)
+            )
+            sums, levers, errors = integrals(joined.height)
+            areas, moments = sums * half, (sums * (starts + half - quad.low) + levers * half) * half
             estimate = total + np.bincount(rows, areas, self.n)
             items, breaks = self._bends(joined, rows, starts, ends, positions)
-            errors = mean_errors(joined.height)
-            accurate = errors * 2 * half <= _TOLERANCE * estimate[rows]
-            accurate |= (errors <= _NOISE * inner.max(axis=1)) | (errors <= quad.noise) | (ends - starts <= narrowest)
-            accurate |= errors * half <= np.ptp(inner, axis=1) * quad.precision  # rounding of positions
-            accurate[items] = True
-            rough = np.flatnonzero(~accurate)
+            is_rough = errors * 2 * half > _TOLERANCE * estimate[rows]
+            is_rough[items] = False
+            rough = np.flatnonzero(is_rough & (ends - starts > narrowest))
+            inner, error = joined.height[INNER, rough], errors[rough]
+            accurate = (error <= _NOISE * inner.max(axis=0)) | (error <= quad.noise)
+            accurate |= error * half[rough] <= np.ptp(inner, axis=0) * quad.precision  # rounding of positions
+            rough = rough[~accurate]
             items, breaks = np.concatenate([items, rough]), np.concatenate([breaks, (starts[rough] + ends[rough]) / 2])
             if turn == _ROUNDS:
                 items, breaks = items[:0], breaks[:0]
             finished = np.ones(len(rows), dtype=bool)
             finished[items] = False
-            flat = quad.flat(joined, self.cuts[:, rows][..., None], base)
-            finished_panels.append(Panels(rows, starts, ends, joined.height, flat, areas, moments).chosen(finished))
+            flat = quad.flat(joined, cuts, base) if quad.output.defuzzifier in MAXIMA else finished
+            whole = Panels(rows, starts, ends, flat, areas, moments, joined.height)
+            finished_panels.append(whole.chosen(finished))
             total = total + np.bincount(rows[finished], areas[finished], self.n)
             if len(items) == 0:
                 break
@@ -245,7 +255,7 @@ class Samples:
                 )
             parents, starts, ends = dividing(items, breaks, starts, ends)
             rows, base = rows[parents], base[parents]
-        return Panels(*map(np.concatenate, zip(*finished_panels, strict=True)))
+        return Panels(*(np.concatenate(column, axis=-1) for column in zip(*finished_panels, strict=True)))
 
     def _bends(
         self, joined: Joined, rows: Indices, starts: Array, ends: Array, positions: Array
@@ -254,23 +264,31 @@ class Samples:
         wide = ends - starts > NARROWEST * 10 * self.quad.width
         events: list[tuple[Indices, Indices, Indices]] = []  # panel, the point before it, and the comparison's index
         minima: list[tuple[Indices, Array]] = []  # panels, and where two sides may meet between two points
-        for k, (slot, turns, left, right) in enumerate(joined.sides):
-            margin, sizes = np.abs(left - right), np.maximum(np.abs(left), np.abs(right))
-            above = (left > right) & (margin > _TIED * sizes)
-            below = (left < right) & (margin > _TIED * sizes)
-            change = (above[:, 1:] & below[:, :-1]) | (below[:, 1:] & above[:, :-1])
-            change &= wide[:, None]
-            chosen = wide
-            if self.quad.is_max:  # what is below later slots does not matter
-                is_top = joined.joins[slot] == joined.height
-                change &= is_top[:, 1:] | is_top[:, :-1]
-                chosen = wide & is_top.any(axis=1)
-            items, first = np.nonzero(change)
-            events.append((items, first, np.full(len(items), k)))
-            if turns:
-                size = sizes.max(axis=1)
-                items = np.flatnonzero(chosen & ~change.any(axis=1) & (margin.min(axis=1) < _CLOSE * size))
-                near, offset = lowest_between(margin[items] / size[items][:, None])
+        cuts = self.cuts[:, rows]
+        for k, one in enumerate(self.quad.comparisons):
+            left, right = (np.broadcast_to(x, positions.shape) for x in self.quad.sides(one, joined, cuts))
+            margin = left - right if one.turns else left[[0, -1]] - right[[0, -1]]
+            lowest, highest = margin.min(axis=0), margin.max(axis=0)
+            items = np.flatnonzero(wide & (lowest < 0.0) & (highest > 0.0))
+            margin, tied = (
+                left[:, items] - right[:, items],
+                _TIED * np.maximum(np.abs(left[:, items]), np.abs(right[:, items])),
+            )
+            above, below = margin > tied, margin < -tied
+            change = (above[1:] & below[:-1]) | (below[1:] & above[:-1])
+            if self.quad.is_max and one.joins:  # what is below later slots does not matter
+                is_top = joined.joins[one.slot][:, items] == joined.height[:, items]
+                change &= is_top[1:] | is_top[:-1]
+            first, changed = np.nonzero(change)
+            events.append((items[changed], first, np.full(len(first), k)))
+            if one.turns:
+                sizes = np.abs([left[4], right[4]]).max(axis=0)
+                items = np.setdiff1d(
+                    np.flatnonzero(wide & (np.maximum(lowest, -highest) < _CLOSE * sizes)), items[changed], True
+                )
+                if self.quad.is_max and one.joins:
+                    items = items[(joined.joins[one.slot][:, items] == joined.height[:, items]).any(axis=0)]
+                near, offset = lowest_between(np.abs(left[:, items] - right[:, items]) / sizes[items])
                 items, offset = items[near], offset[near]
                 minima.append((items, (starts[items] + ends[items]) / 2 + offset * (ends[items] - starts[items]) / 2))
         items, breaks = self._located(events, rows, positions)
@@ -284,13 +302,15 @@ class Samples:
         """Return the panel of each event, and where two sides are equal."""
         none = np.zeros(0, dtype=np.intp)
         items, first, compared = (np.concatenate(column) for column in zip((none, none, none), *events, strict=True))
+        cuts = self.cuts[:, rows[items]]
 
         def margin(x: Array, which: Indices) -> Array:
-            sides = self.heights(x, rows[items[which]]).sides
-            margins = np.array([np.broadcast_to(left - right, x.shape) for _, _, left, right in sides])
-            return np.asarray(margins[compared[which], np.arange(len(x))])
+            bounds = np.searchsorted(compared[which], np.arange(len(self.quad.comparisons) + 1)).tolist()
+            parts = zip(self.quad.comparisons, itertools.pairwise(bounds), strict=True)
+            margins = [self.quad.margin(one, x[a:b], cuts[:, which[a:b]]) for one, (a, b) in parts if a < b]
+            return np.concatenate(margins)
 
         if not len(items):
             return none, np.zeros(0)
-        middles, ok = roots(margin, positions[items, first], positions[items, first + 1], self.quad.precision)
+        middles, ok = roots(margin, positions[first, items], positions[first + 1, items], self.quad.precision)
         return items[ok], middles[ok]
