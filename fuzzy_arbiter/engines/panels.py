@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -39,14 +39,15 @@ class Panels(NamedTuple):
     rows: Indices  # sample of each panel
     starts: Array
     ends: Array
-    flat: Mask  # True where the height is constant
     areas: Array
     moments: Array  # about the universe's start
+    flat: Mask  # True where the height is constant
     heights: Array  # at the points of each panel, shape (points, panels)
 
     def chosen(self, which: Mask | Indices) -> Panels:
         """Return some of the panels."""
-        return Panels(*(column[..., which] for column in self))
+        columns: list[Any] = [column[..., which] for column in self]
+        return Panels(*columns)
 
 
 def points_of(starts: Array, ends: Array, at: Array = POINTS) -> Array:

@@ -43,7 +43,7 @@ _TOLERANCE = 1e-12  # tolerance of each panel, as a fraction of the area
 _ROUNDS = 60  # maximum number of divisions of a panel
 _MAX_PANELS = 4000  # maximum number of panels of a sample that are divided at a time
 _MAX_TABLE = 2**25  # maximum number of degrees at the points of the terms' panels
-_BLOCK = 2**19  # number of degrees that are computed at a time
+_BLOCK = 2**18  # number of degrees that are computed at a time
 _TIED = 1e-12  # sides of a comparison count as equal if their quotient differs from 1 by less
 _NOISE = 4e-16  # error of a height by rounding, as a fraction of it, or of 1 where it is a difference from 1
 MAXIMA = ("mom", "som", "lom")
@@ -67,7 +67,7 @@ class Comparison(NamedTuple):
     """A comparison in a formula by which a slot is implied or joined."""
 
     slot: int
-    index: int  # among those of the formula
+    place: int  # among those of the formula
     joins: bool  # True if it is of the join
     turns: bool  # False if the difference of its sides only rises or only falls in a panel
 
@@ -155,8 +155,8 @@ class Quadrature(Defuzzifier):
     def sides(self, one: Comparison, joined: Joined, cuts: Array) -> tuple[Array, Array]:
         """Return both sides of a comparison."""
         if one.joins:
-            return self._join.sides(joined.joins[one.slot - 1], joined.implied[one.slot])[one.index]
-        return self.implications[one.slot].sides(cuts[one.slot], joined.degrees[one.slot])[one.index]
+            return self._join.sides(joined.joins[one.slot - 1], joined.implied[one.slot])[one.place]
+        return self.implications[one.slot].sides(cuts[one.slot], joined.degrees[one.slot])[one.place]
 
     def margin(self, one: Comparison, positions: Array, cuts: Array) -> Array:
         """Return the difference of both sides of a comparison at positions."""
@@ -164,7 +164,7 @@ class Quadrature(Defuzzifier):
             left, right = self.sides(one, self.heights(positions, cuts, one.slot + 1), cuts)
         else:
             degrees = self._degrees(self.terms[one.slot], positions)
-            left, right = self.implications[one.slot].sides(cuts[one.slot], degrees)[one.index]
+            left, right = self.implications[one.slot].sides(cuts[one.slot], degrees)[one.place]
         return np.asarray(left - right)
 
     def flat(self, joined: Joined, cuts: Array, panels: Indices) -> Mask:
@@ -192,11 +192,12 @@ class Samples:
 
     def __init__(self, quad: Quadrature, cuts: Array) -> None:
         self.quad, self.cuts, self.n = quad, cuts, cuts.shape[1]
+        self.of_maximum = quad.output.defuzzifier in MAXIMA
 
     def values(self) -> Array:
         """Return the value of each sample, shape (n,)."""
         panels, kind, low = self.panels(), self.quad.output.defuzzifier, self.quad.low
-        if kind in MAXIMA:
+        if self.of_maximum:
             return defuzzification.of_maximum(self, panels, kind)
         areas = np.bincount(panels.rows, panels.areas, self.n).astype(np.float64)
         some = areas > 0.0
@@ -229,7 +230,7 @@ class Samples:
             sums, levers, errors = integrals(joined.height)
             areas, moments = sums * half, (sums * (starts + half - quad.low) + levers * half) * half
             estimate = total + np.bincount(rows, areas, self.n)
-            items, breaks = self._bends(joined, rows, starts, ends, positions)
+            items, breaks = self._bends(joined, rows, starts, ends)
             is_rough = errors * 2 * half > _TOLERANCE * estimate[rows]
             is_rough[items] = False
             rough = np.flatnonzero(is_rough & (ends - starts > narrowest))
@@ -242,8 +243,8 @@ class Samples:
                 items, breaks = items[:0], breaks[:0]
             finished = np.ones(len(rows), dtype=bool)
             finished[items] = False
-            flat = quad.flat(joined, cuts, base) if quad.output.defuzzifier in MAXIMA else finished
-            whole = Panels(rows, starts, ends, flat, areas, moments, joined.height)
+            kept = (quad.flat(joined, cuts, base), joined.height) if self.of_maximum else (finished, joined.height[:0])
+            whole = Panels(rows, starts, ends, areas, moments, *kept)
             finished_panels.append(whole.chosen(finished))
             total = total + np.bincount(rows[finished], areas[finished], self.n)
             if len(items) == 0:
@@ -257,16 +258,14 @@ class Samples:
             rows, base = rows[parents], base[parents]
         return Panels(*(np.concatenate(column, axis=-1) for column in zip(*finished_panels, strict=True)))
 
-    def _bends(
-        self, joined: Joined, rows: Indices, starts: Array, ends: Array, positions: Array
-    ) -> tuple[Indices, Array]:
+    def _bends(self, joined: Joined, rows: Indices, starts: Array, ends: Array) -> tuple[Indices, Array]:
         """Return panels, and where in them the joined terms bend."""
         wide = ends - starts > NARROWEST * 10 * self.quad.width
         events: list[tuple[Indices, Indices, Indices]] = []  # panel, the point before it, and the comparison's index
         minima: list[tuple[Indices, Array]] = []  # panels, and where two sides may meet between two points
         cuts = self.cuts[:, rows]
         for k, one in enumerate(self.quad.comparisons):
-            left, right = (np.broadcast_to(x, positions.shape) for x in self.quad.sides(one, joined, cuts))
+            left, right = (np.broadcast_to(x, joined.height.shape) for x in self.quad.sides(one, joined, cuts))
             margin = left - right if one.turns else left[[0, -1]] - right[[0, -1]]
             lowest, highest = margin.min(axis=0), margin.max(axis=0)
             items = np.flatnonzero(wide & (lowest < 0.0) & (highest > 0.0))
@@ -291,13 +290,13 @@ class Samples:
                 near, offset = lowest_between(np.abs(left[:, items] - right[:, items]) / sizes[items])
                 items, offset = items[near], offset[near]
                 minima.append((items, (starts[items] + ends[items]) / 2 + offset * (ends[items] - starts[items]) / 2))
-        items, breaks = self._located(events, rows, positions)
+        items, breaks = self._located(events, rows, starts, ends)
         inside = (breaks > starts[items]) & (breaks < ends[items])
         items, breaks = (np.concatenate(x) for x in zip((items[inside], breaks[inside]), *minima, strict=True))
         return items, breaks
 
     def _located(
-        self, events: Sequence[tuple[Indices, Indices, Indices]], rows: Indices, positions: Array
+        self, events: Sequence[tuple[Indices, Indices, Indices]], rows: Indices, starts: Array, ends: Array
     ) -> tuple[Indices, Array]:
         """Return the panel of each event, and where two sides are equal."""
         none = np.zeros(0, dtype=np.intp)
@@ -312,5 +311,6 @@ class Samples:
 
         if not len(items):
             return none, np.zeros(0)
-        middles, ok = roots(margin, positions[first, items], positions[first + 1, items], self.quad.precision)
+        before, after = points_of(starts[items], ends[items], POINTS[[first, first + 1]])
+        middles, ok = roots(margin, before, after, self.quad.precision)
         return items[ok], middles[ok]
