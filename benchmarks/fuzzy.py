@@ -40,12 +40,16 @@ _OTHER_TIPPING: dict[str, dict[str, Any]] = {
     "Gaussian tips": {"curved": True},
     "Gaussian tips, bisector": {"curved": True, "defuzzifier": "bisector"},
     "Gaussian tips, mean of maxima": {"curved": True, "defuzzifier": "mom"},
+    "Gaussian tips, prod": {"curved": True, "implication": "prod"},
+    "Gaussian tips, probabilistic sum": {"curved": True, "aggregation": "probor"},
     "sum of triangles": {"aggregation": "sum"},
     "probabilistic sum of triangles": {"aggregation": "probor"},
 }
 _FUZZYLITE_WORDS: dict[str, dict[str, str]] = {name: {} for name in _OTHER_TIPPING} | {
     "Gaussian tips, bisector": {"defuzzifier": "Bisector"},
     "Gaussian tips, mean of maxima": {"defuzzifier": "MeanOfMaximum"},
+    "Gaussian tips, prod": {"implication": "AlgebraicProduct"},
+    "Gaussian tips, probabilistic sum": {"aggregation": "AlgebraicSum"},
     "sum of triangles": {"aggregation": "UnboundedSum"},
     "probabilistic sum of triangles": {"aggregation": "AlgebraicSum"},
 }
@@ -87,7 +91,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
         for points in (100, 1000):
             label = f"batch of {len(rows)}: pyfuzzylite, resolution {points}, tipping, {name}"
             add(label, _other_batch({**words, "resolution": points}, len(rows), repeats))
-        if "curved" in options:
+        if "curved" in options and not {"implication", "aggregation"} & set(options):
             setup = {"points": POINTS, "defuzzifier": options.get("defuzzifier", "centroid")}
             stock = _stock(skfuzzy_rules.tipping, max(2, few // 10), repeats, setup)
             add(f"batch: scikit-fuzzy, stock, arrays, {POINTS} points, tipping, {name}", stock)
@@ -143,7 +147,9 @@ def _general() -> Arbiter:
     return Arbiter(replace(system, rules=(*system.rules[:-1], replace(system.rules[-1], weight=0.9))))
 
 
-def _tipping(curved: bool = False, defuzzifier: Defuzzifier = "centroid", aggregation: str = "max") -> Arbiter:
+def _tipping(
+    curved: bool = False, defuzzifier: Defuzzifier = "centroid", aggregation: str = "max", implication: str = "min"
+) -> Arbiter:
     service, food = (Variable(name, (0, 10), auto_terms(3)) for name in ("service", "food"))
     terms: dict[str, Membership] = {
         "low": triangle(0, 0, 13), "medium": triangle(0, 13, 25), "high": triangle(13, 25, 25),
@@ -155,9 +161,8 @@ def _tipping(curved: bool = False, defuzzifier: Defuzzifier = "centroid", aggreg
         "if service is average then tip is medium",
         "if service is good or food is good then tip is high",
     )
-    return Arbiter(
-        system=System((service, food), (Output("tip", (0, 25), terms, None, defuzzifier, aggregation),), rules)
-    )
+    tip = Output("tip", (0, 25), terms, None, defuzzifier, aggregation)
+    return Arbiter(System((service, food), (tip,), rules, implication=implication))
 
 
 def _looped(arbiter: Arbiter, rows: np.ndarray[Any, np.dtype[np.float64]], repeats: int) -> Timing | str:

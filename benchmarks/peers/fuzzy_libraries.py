@@ -63,7 +63,13 @@ SYSTEMS: dict[str, Any] = {
 Evaluate = Callable[[list[float]], list[float]]
 
 
-def _fuzzylite_text(system: str, resolution: int, defuzzifier: str = "Centroid", aggregation: str = "Maximum") -> str:
+def _fuzzylite_text(
+    system: str,
+    resolution: int,
+    defuzzifier: str = "Centroid",
+    aggregation: str = "Maximum",
+    implication: str = "Minimum",
+) -> str:
     """Return a system's text in the FuzzyLite language."""
     inputs, outputs, rules = SYSTEMS[system]
     text = [f"Engine: {system}"]
@@ -86,7 +92,7 @@ def _fuzzylite_text(system: str, resolution: int, defuzzifier: str = "Centroid",
                     shape = "Ramp {} {}".format(*(x for x, _ in sorted(points, key=lambda point: point[1])))
                 text += [f"  term: {term} {shape}"]
     text += ["RuleBlock:", "  enabled: true", "  conjunction: Minimum", "  disjunction: Maximum"]
-    text += ["  implication: Minimum", "  activation: General"]
+    text += [f"  implication: {implication}", "  activation: General"]
     text += [f"  rule: if {f' {join} '.join(asked)} then {concluded}" for asked, join, concluded in rules]
     return "\n".join(text)
 

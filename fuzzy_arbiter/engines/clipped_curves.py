@@ -69,15 +69,18 @@ class ClippedCurves(Defuzzifier):
             "bisector": f"integrals of polynomials, halves of the area within {BOUND:g} of it",
         }.get(self._kind, "positions at which polynomials have the maximum height, without a bound of their errors")
         self._max, self._scales = output.aggregation == "max", slots[0].implication == "prod"
+        self._envelops = self._max and self._scales and self._kind == "centroid"
         edges = smooth_panels(output.universe, list(dict.fromkeys(shapes)))
         if len(shapes) ** (2 if self._max else 1) * len(edges) * len(_TABLE) > _MAX_TABLE:
             raise EngineError(f"output {output.name!r}: its {len(shapes)} terms have too many panels or crossings")
         edges = with_crossings(edges, shapes) if self._max else edges
         edges = halved(edges) if self._scales and self._kind != "centroid" else edges
-        self._slots, lines, keys, self._error = _lines(edges, shapes, self._max)
+        self._slots, lines, keys, self._error = _lines(edges, shapes, self._max and not self._envelops)
         if not self._error < _ERROR * max(shape.area(output.universe) for shape in shapes):
             raise EngineError(f"output {output.name!r}: its terms are too rough, expected smooth terms")
-        self._lines = np.concatenate([lines, lines], axis=1) if self._max else lines  # clipped at tops, and at bottoms
+        self._humps = _humps(edges, shapes) if self._envelops else []
+        # clipped at tops, and at bottoms
+        self._lines = np.concatenate([lines, lines], axis=1) if self._max and not self._envelops else lines
         self._plain_slots: list[list[int]] = self._slots.tolist()
         self._keys, self._positions = keys, np.tile(_TABLE, self._slots.size)
         ones = np.ones(self._lines.shape[1])
@@ -135,7 +138,8 @@ class ClippedCurves(Defuzzifier):
         if self._kind == "bisector":
             result, smooth = self._bisectors(cuts)
         else:
-            area, moment = self._scaled(cuts) if self._scales else self._clipped(cuts)
+            compute = self._enveloped if self._envelops else self._scaled if self._scales else self._clipped
+            area, moment = compute(cuts)
             smooth = area * _ERROR >= self._error
             result = self._universe[0] + moment / np.where(smooth, area, 1.0)
         if not smooth.all():
@@ -146,6 +150,42 @@ class ClippedCurves(Defuzzifier):
         """Return the areas and moments of scaled terms; cuts (slots, n), returns (n,)."""
         heights = cuts[self._slots.ravel()]
         return _summed(self._full[0], heights), _summed(self._full[1], heights)
+
+    def _enveloped(self, cuts: Array) -> tuple[Array, Array]:
+        """Return the areas and moments under the highest scaled terms; NaN where these may cross more than once."""
+        sign, low, high = self._lines[2:_DEGREE].reshape(3, *self._slots.shape, 1)
+        scales, rows, slots = cuts[self._slots], np.arange(cuts.shape[1]), self._slots.ravel()
+        ends = (np.where(sign > 0.0, *sides) * scales for sides in ((low, high), (high, low)))
+        # the highest lines at both ends of a panel, between which the quotients of terms only rise or only fall
+        left, right = (x.argmax(axis=1) + self._slots.shape[1] * np.arange(len(self._slots))[:, None] for x in ends)
+        areas, moments = (full[left] * cuts[slots[left], rows] for full in self._full)
+        panel, row = np.nonzero(left != right)
+        pair = np.array([left[panel, row], right[panel, row]])  # (2, crossings)
+        cut, lines = cuts[slots[pair], row], self._lines[:, pair]
+
+        def heights(t: Array, chosen: Array, cut: Array) -> Array:
+            return np.asarray((chosen[_DEGREE:_INTEGRAL] * _powers(chosen[2] * t, _ORDER)).sum(axis=0) * cut)
+
+        def margin(t: Array, which: Indices) -> Array:
+            return np.asarray(np.subtract(*heights(t, lines[:, :, which], cut[:, which])))
+
+        t, has_root = roots(margin, np.full(len(row), -1.0), np.ones(len(row)), 1e-15)
+        t = np.where(has_root, t, 1.0)  # where both are equal at an end
+        for total, full, part in zip(
+            (areas, moments), self._full[:, pair], _integrals(lines, lines[2] * t), strict=True
+        ):
+            before = np.where(lines[2] > 0.0, part, full - part)
+            total[panel, row] = cut[0] * before[0] + cut[1] * (full - before)[1]
+        area = areas.sum(axis=0)
+        others = heights(
+            t, self._lines.reshape(-1, *self._slots.shape)[:, panel].swapaxes(1, 2), scales[panel, :, row].T
+        )
+        area[row[(others > heights(t, lines[:, 0], cut[0]) * (1.0 + 1e-9) + 1e-15).any(axis=0)]] = np.nan
+        for slot, below, place, ratio in self._humps:
+            tops = slots[left[place]], slots[right[place]]
+            unsure = ((tops[0] == below) | (tops[1] == below)) & (tops[0] != slot) & (tops[1] != slot)
+            area[unsure & (cuts[slot] * ratio > cuts[below])] = np.nan
+        return area, moments.sum(axis=0)
 
     def _clipped(self, cuts: Array) -> tuple[Array, Array]:
         """Return the areas and moments of clipped terms; cuts (slots, n), returns (n,)."""
@@ -189,8 +229,7 @@ class ClippedCurves(Defuzzifier):
 
         def below(r: Array, which: Indices) -> Array:
             """Return each line's area before a position in its panel."""
-            powers = _powers(np.minimum(r, end[:, which]).ravel(), _ORDER + 1).reshape(-1, *r.shape)
-            before = (integral[:, :, which] * powers).sum(axis=0)
+            before = (integral[:, :, which] * _powers(np.minimum(r, end[:, which]), _ORDER + 1)).sum(axis=0)
             return np.asarray(before + level[:, which] * np.maximum(r - end[:, which], 0.0))
 
         whole = below(np.ones(chosen.shape), rows)
@@ -299,13 +338,13 @@ def _dot(coefficients: Array, powers: Array) -> Array:
 
 
 def _powers(r: Array, count: int) -> Array:
-    """Return the powers of r from 0 on, shape (count, n)."""
-    result = np.empty((count, len(r)))
+    """Return the powers of r from 0 on, shape (count, ...)."""
+    result = np.empty((count, *r.shape))
     result[0], result[1:] = 1.0, r
     return np.asarray(np.multiply.accumulate(result, axis=0, out=result))
 
 
-def _integrals(lines: Array, r: Array, cut: Array) -> tuple[Array, Array]:
+def _integrals(lines: Array, r: Array, cut: Array | float = 0.0) -> tuple[Array, Array]:
     """Return area and moment under lines that are cut from r on."""
     (middle, half, sign), powers = lines[:3], _powers(r, _ORDER + 2)
     area = half * (_dot(lines[_INTEGRAL:_LEVER], powers[:-1]) + cut * (1.0 - r))
@@ -338,6 +377,19 @@ def with_crossings(edges: Array, shapes: Sequence[Membership]) -> Array:
 
     crossings, _ = roots(margins, np.concatenate(starts), np.concatenate(ends), precision)
     return np.unique([*edges, *crossings[np.isfinite(crossings)]])
+
+
+def _humps(edges: Array, shapes: Sequence[Membership]) -> list[tuple[int, int, int, float]]:
+    """Return pairs of terms, panels in which their quotient is the greatest between both ends, and a bound of it."""
+    degrees = _degrees(shapes, points_of(edges[:-1], edges[1:], _INNER_TABLE))
+    result = []
+    for i, k in itertools.permutations(range(len(shapes)), 2):
+        with np.errstate(all="ignore"):
+            ratios = np.nan_to_num(degrees[i] / degrees[k], nan=0.0, posinf=np.inf)
+        highest = ratios.max(axis=0)
+        panels = np.flatnonzero(highest > np.maximum(ratios[0], ratios[-1]) * (1.0 + 1e-9))
+        result += [(i, k, int(p), 1.01 * float(highest[p])) for p in panels]
+    return result
 
 
 def _lines(edges: Array, shapes: Sequence[Membership], ordered: bool) -> tuple[Indices, Array, Array, float]:

@@ -19,7 +19,7 @@ from fuzzy_arbiter.errors import EngineError
 _MAXIMA = {("max", "min"), ("max", "prod")}
 # aggregations and implications of outputs whose values follow from lines of terms alone
 _BY_LINES = {
-    "centroid": {("max", "min"), ("sum", "min"), ("sum", "prod")},
+    "centroid": {("max", "min"), ("max", "prod"), ("sum", "min"), ("sum", "prod")},
     "bisector": {("max", "min"), ("sum", "min")},
     **dict.fromkeys(("mom", "som", "lom"), _MAXIMA),
 }

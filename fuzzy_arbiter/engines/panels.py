@@ -24,10 +24,8 @@ INNER = slice(1, -1)  # the nodes among the points
 ANALYSIS = (np.arange(ORDER)[:, None] + 0.5) * legendre.legvander(NODES, ORDER - 1).T * WEIGHTS
 NARROWEST = 1e-14  # least width of a panel that is divided, as a fraction of the universe's maximum number
 _STATIC = 1e-13  # tolerance of a panel of one term, as a fraction of the term's area
-# factors of the values at the nodes: of mean and lever, the series' last terms, and its values at the outer points
-_FACTORS = np.vstack(
-    [WEIGHTS, WEIGHTS * NODES, ANALYSIS[4:], legendre.legvander(POINTS[[0, -1]], ORDER - 1) @ ANALYSIS]
-)
+# factors of the values at the nodes: of the series' last terms, and of its values at the outer points
+_FACTORS = np.vstack([ANALYSIS[4:], legendre.legvander(POINTS[[0, -1]], ORDER - 1) @ ANALYSIS])
 _REST = 8.0  # greatest rest of a smooth function's series at an end, as a multiple of its last terms
 _MAX_PANELS = 4096
 _MAX_HALVINGS = 60
@@ -61,12 +59,14 @@ def integrals(values: Array) -> tuple[Array, Array, Array]:
     # A series whose terms fall by r from the degrees 4 and 5 to 6 and 7 falls by r^5 until degree 16, the first that
     # the nodes do not integrate. A series that does not reach the values at the ends hides a steep part between an end
     # and the node beside it.
-    area, moment, *series, first, last = _FACTORS @ values[INNER]
+    *series, first, last = _FACTORS @ values[INNER]
     before, rest = np.abs(series[0]) + np.abs(series[1]), np.abs(series[2]) + np.abs(series[3])
     with np.errstate(divide="ignore", invalid="ignore"):
         decay = np.where(rest < before, rest / before, 1.0)
     off = np.maximum(np.abs(first - values[0]), np.abs(last - values[-1]))
     hidden = np.where(off > _REST * rest, off * (1.0 - NODES[-1]) / 2, 0.0)
+    # not by a product of matrices, of which a column's bits depend on the number of columns
+    area, moment = (np.add.reduce(factors[:, None] * values[INNER]) for factors in (WEIGHTS, WEIGHTS * NODES))
     return area, moment, np.maximum(rest * decay**5, hidden)
 
 
