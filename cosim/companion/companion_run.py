@@ -222,15 +222,11 @@ class Companion:
             if live is not None:
                 live.begin(self.scenario, master.signals.columns, self.session.commands)
             self.prepare(show_state)
-            folder = claim(None if out is None else Path(out), self.scenario)
+            folder, recorder = claim(None if out is None else Path(out), self.scenario), None
             with folder.writing():
-                try:
-                    recorder = Recorder(folder.path, master.signals.columns)
-                except BaseException:
-                    folder.discard()
-                    raise
                 started = time.perf_counter()
                 try:
+                    recorder = Recorder(folder.path, master.signals.columns)
                     status = self._steer(master, [recorder] if live is None else [recorder, live], show_state)
                 finally:
                     self.session.release(_RELEASE_TIME)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 from cosim.mavlink.event_texts import EventTexts
@@ -24,10 +23,8 @@ from cosim.mavlink.services.service import Handler, Service
 from cosim.mavlink.services.targets import Targets
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.mavlink.wire.link import Link
-from cosim.mavlink.wire.options import COMPONENT_ID, MavlinkOptions
-from cosim.scenario.scenario import Scenario
-from cosim.simulation.commands.sources import CommandQueue
-from cosim.simulation.signals import Array, Column
+from cosim.mavlink.wire.options import COMPONENT_ID
+from cosim.simulation.signals import Array
 
 _HEARTBEAT_PERIOD = 1.1  # s of the wall clock without a heartbeat, after which one is sent: above the stream's second
 _SNAPSHOT_TIMEOUT = 0.5  # s of the wall clock without a snapshot, after which streams go by that clock
@@ -41,15 +38,8 @@ class Autopilot:
     # of ground stations follow the wall clock, and so do the streams while simulated time stands still. No received
     # message raises. All methods are called from one thread.
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        columns: Sequence[Column],
-        options: MavlinkOptions,
-        commands: CommandQueue | None,
-        live: bool = True,
-    ) -> None:
-        self._context = context = VehicleContext(scenario, columns, options, commands, live)
+    def __init__(self, context: VehicleContext) -> None:
+        self._context = context
         self._streams: dict[Link, Streams] = {}
         self._events = EventTexts(context)
         parameters = ParameterProtocol(context)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.thread import LinkThread
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.link import open_links
 from cosim.mavlink.wire.options import MavlinkOptions
@@ -56,7 +57,7 @@ class Mavlink:
         TelemetryError
             If a link cannot be opened.
         """
-        autopilot = Autopilot(scenario, columns, self.options, commands if self.options.commands else None)
+        autopilot = Autopilot(VehicleContext(scenario, columns, self.options, commands))
         links = open_links(self.endpoints, self.options)
         return LinkThread(autopilot, links, scenario.time.step, max_lead(scenario, rate))
 

@@ -11,6 +11,7 @@ from cosim.errors import RunError
 from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.run_links import max_lead
 from cosim.mavlink.thread import MAX_SNAPSHOTS, SNAPSHOT_PERIOD, LinkThread
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.link import open_links
 from cosim.mavlink.wire.options import MavlinkOptions
@@ -44,7 +45,7 @@ def stream_record(
     require_columns(scenario, record)
     expected = set(column_names(scenario))  # further columns could separate columns that are read as one slice
     columns = [column for column in record.columns if column.name in expected or column.name.startswith("law.")]
-    autopilot = Autopilot(scenario, columns, options, commands=None, live=False)
+    autopilot = Autopilot(VehicleContext(scenario, columns, options, commands=None, live=False))
     thread = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step, max_lead(scenario, rate))
     every = max(1, round(SNAPSHOT_PERIOD / scenario.time.step))
     thread.start()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from pathlib import Path
 
@@ -20,19 +21,14 @@ class Flight:
 
     def __init__(self, scenario: Scenario, law: AutopilotLaw, out: Path | None, record_rate: float) -> None:
         self.scenario = scenario
-        self._master = Master(scenario, law)
-        try:
+        with contextlib.ExitStack() as undo:
+            self._master = undo.enter_context(Master(scenario, law))
             self._claimed = claim(out, scenario)
+            undo.callback(self._claimed.discard)
             self.folder = self._claimed.path
-            try:
-                self._recorder = Recorder(self.folder, self._master.signals.columns)
-            except BaseException:
-                self._claimed.discard()
-                raise
-        except BaseException:
-            self._master.close()
-            raise
-        self._reader = MotionReader(self._master.plant, Rangefinder(scenario))
+            self._recorder = Recorder(self.folder, self._master.signals.columns)
+            self._reader = MotionReader(self._master.plant, Rangefinder(scenario))
+            undo.pop_all()
         self._every = max(1, round(1.0 / (record_rate * scenario.time.step)))
         self._started = time.perf_counter()
         self._wall_time: float | None = None

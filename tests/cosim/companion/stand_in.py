@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.vehicle.profile import PROFILES
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.ground_end import ReceivedMessage
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import load_scenario
@@ -39,7 +40,8 @@ class StandIn:
         self.queue = CommandQueue()
         self.profile = PROFILES[profile]
         options = MavlinkOptions(profile=profile, commands=True)
-        self.autopilot = Autopilot(self.master.scenario, self.master.signals.columns, options, self.queue)
+        self.context = VehicleContext(self.master.scenario, self.master.signals.columns, options, self.queue)
+        self.autopilot = Autopilot(self.context)
         self.shift = np.array(shift)  # m: of the scene's origin in the autopilot's own frame
         self.cut = False  # True: no link at all
         self.refused_commands, self.silent = set(), set(silent)  # commands and messages that go nowhere

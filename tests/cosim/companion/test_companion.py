@@ -313,7 +313,7 @@ FAULTS = {
     "frame jump": lambda link: position_off(link, 1.0),
     "heading leap": lambda link: heading_off(link, 8.0),
     "battery": lambda link: changed(link, "SYS_STATUS", battery_remaining=12),
-    "leak": lambda link: link.autopilot._context.send_text("Leak Detected"),
+    "leak": lambda link: link.context.send_text("Leak Detected"),
     "pilot gain": lambda link: link.hear(mavlink.MAVLink_named_value_float_message(0, b"PilotGain", 1.0), 1, 1),
     "takeover": lambda link: command(link, 193, 0.0, system=IDENTITY[0], component=IDENTITY[1]),
 }
@@ -325,7 +325,7 @@ def test_fault_holds_the_vehicle_within_one_second(tmp_path, reason, link):
     flight = Flight(tmp_path, link=link, events=[lambda: FAULTS[reason](link)], least_battery=20.0)
     flight.held(reason)
     if reason != "lost link":
-        assert link.mode() == 1 and link.autopilot._context.sticks == (0.0,) * 6  # position hold
+        assert link.mode() == 1 and link.context.sticks == (0.0,) * 6  # position hold
 
 
 @pytest.mark.medium
@@ -510,7 +510,7 @@ def test_overridden_channels_rest_in_the_middle_and_are_then_given_back(tmp_path
     *middle, (last_at, last) = [(at, pulses) for at, pulses in sent if pulses in ([1500] * 6, [0] * 6)][-4:]
     assert last == [0] * 6 and all(pulses == [1500] * 6 for _, pulses in middle) and last_at == sent[-1][0]
     assert last_at - 100.0 >= since + 0.15
-    assert link.autopilot._context.sticks == (0.0,) * 6
+    assert link.context.sticks == (0.0,) * 6
 
 
 def station(system, kind=mavlink.MAV_TYPE_GCS):

@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from cosim.errors import TelemetryError
 from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.thread import LinkThread
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.link import open_links
 from cosim.mavlink.wire.options import MavlinkOptions
@@ -46,7 +47,7 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> I
     scenario = load_scenario("paper-limited", ("commands.enabled=true", "time.duration=3600"))
     commands, begun = CommandQueue(), _FirstStep()
     with Master(scenario) as master:
-        autopilot = Autopilot(scenario, master.signals.columns, options, commands)
+        autopilot = Autopilot(VehicleContext(scenario, master.signals.columns, options, commands))
         links = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step)
         stepper = threading.Thread(target=lambda: master.run([begun, links], 1.0, commands), daemon=True)
         stepper.start()

@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.vehicle.profile import PROFILES
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import Scenario, load_scenario
 from cosim.simulation.columns import column_names
@@ -120,7 +121,8 @@ class Station:
     ) -> None:
         self.commands, self.profile = CommandQueue(), PROFILES[profile]
         options = MavlinkOptions(profile=profile, commands=commands, **options)  # type: ignore[arg-type]
-        self.autopilot = Autopilot(of or scenario(), COLUMNS, options, self.commands)  # type: ignore[arg-type]
+        self.context = VehicleContext(of or scenario(), COLUMNS, options, self.commands)  # type: ignore[arg-type]
+        self.autopilot = Autopilot(self.context)
         self.wire, self.now, self.time = Wire(), 100.0, 0.0
         self.autopilot.attach(self.wire)
         self.autopilot.tick(self.now)

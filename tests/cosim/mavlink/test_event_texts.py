@@ -49,7 +49,7 @@ def test_long_text_is_split_into_chunks(station):
     for length in (50, 51, 100, 101, 150, 500):
         station.wait(1.0)
         station.wire.clear()
-        station.autopilot._context.send_text("x" * length)
+        station.context.send_text("x" * length)
         parts = station.wire.of("STATUSTEXT")
         assert station.wire.texts == ["x" * min(length, 200)]
         if length > 50:
@@ -62,7 +62,7 @@ def test_long_text_is_split_into_chunks(station):
 
 def test_status_text_rate_is_limited_and_the_rest_is_sent_later(station):
     for k in range(30):
-        station.autopilot._context.send_text(f"text {k}")
+        station.context.send_text(f"text {k}")
     assert len(station.wire.texts) == 12
     station.wait(3.0)
     assert station.wire.texts == [f"text {k}" for k in range(30)]

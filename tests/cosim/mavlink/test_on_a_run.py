@@ -5,6 +5,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.autopilot import Autopilot
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands.sources import CommandQueue
@@ -22,8 +23,8 @@ class Flight(Station):
         self.master, self.k = master, 0
         self.commands, self.wire, self.now = CommandQueue(), Wire(), 0.0
         options = MavlinkOptions(profile="ardusub", commands=True)
-        self.autopilot = Autopilot(master.scenario, master.signals.columns, options, self.commands)
-        self.profile, self.context = self.autopilot._context.profile, self.autopilot._context
+        self.context = VehicleContext(master.scenario, master.signals.columns, options, self.commands)
+        self.profile, self.autopilot = self.context.profile, Autopilot(self.context)
         self.autopilot.attach(self.wire)
 
     def fly(self, seconds):

@@ -57,7 +57,7 @@ def test_every_setting_has_a_name_of_its_own_and_none_of_a_station_parameter(nam
     assert len(set(names.values())) == len(keys)
     assert all(0 < len(n) <= 16 and n == n.upper() for n in names.values())
     for profile in ("ardusub", "px4"):
-        assert not set(names.values()) & set(station_parameters(Station(profile).autopilot._context))
+        assert not set(names.values()) & set(station_parameters(Station(profile).context))
 
 
 def test_parameter_list_waits_for_free_link_capacity(station):
@@ -213,7 +213,7 @@ def test_full_queue_leaves_the_value_unchanged(station):
     for i in range(300):
         put(station, "GOAL_RADIUS", 1.0 + i)
     assert len(station.commanded()) == 256
-    settings = {setting.key: setting.value for setting in station.autopilot._context.settings}
+    settings = {setting.key: setting.value for setting in station.context.settings}
     assert value_of(station, "GOAL_RADIUS") == settings["goal.radius"] == 256.0
 
 

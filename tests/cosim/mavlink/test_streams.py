@@ -16,7 +16,7 @@ ATTITUDE = 30
 
 def run(station, seconds, step=0.01):
     """Count the messages of some simulated time."""
-    start = station.autopilot._context.view.boot_us / 1e6
+    start = station.context.view.boot_us / 1e6
     station.wire.clear()
     for k in range(1, round(seconds / step) + 1):
         station.look(start + step * k)
