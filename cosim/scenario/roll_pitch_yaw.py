@@ -11,7 +11,7 @@ import numpy as np
 from controller import quaternion
 from cosim.errors import ScenarioError
 from cosim.scenario.region_tables import Vector3
-from cosim.scenario.toml_file import ANGLE_KEYS
+from cosim.scenario.toml_file import ANGLE_KEYS, shapes_in, takes_key
 from plant_fmu.toml_tables import decode
 
 
@@ -31,19 +31,9 @@ def with_quaternions(table: dict[str, Any]) -> dict[str, Any]:
 
 def _attitudes(table: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Yield where angles are given, the key of the quaternion that they replace, and the table that holds them."""
-    holders = {name: table.get(name) for name in ("initial", "law", "goal")}
-    regions = table.get("regions")
-    for i, region in enumerate(regions if isinstance(regions, list | tuple) else ()):
-        holders[f"regions[{i}].shape"] = region.get("shape") if isinstance(region, dict) else None
-    for where, holder in holders.items():
+    holders = {name: holder for name in ("initial", "law") if isinstance(holder := table.get(name), dict)}
+    for where, holder in (holders | shapes_in(table)).items():
         for key, angles in ANGLE_KEYS.items():
-            if isinstance(holder, dict) and angles in holder and not _is_own_shape(holder):
+            # a shape without a quaternion, such as a user's, may have a key of that name
+            if angles in holder and (not isinstance(holder.get("type"), str) or takes_key(holder, "quaternion")):
                 yield where, key, holder
-
-
-def _is_own_shape(holder: dict[str, Any]) -> bool:
-    """Return True for a shape without a quaternion, such as a user's, which may have a key of that name."""
-    from controller.regions.shapes import ENTRIES
-
-    kind = holder.get("type")
-    return isinstance(kind, str) and (kind not in ENTRIES or "quaternion" not in ENTRIES[kind].units)

@@ -346,9 +346,8 @@ def rename_former_keys(table: dict[str, Any]) -> dict[str, Any]:
 
 def _former_keys(table: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Yield each former key of a scenario's goal, shapes and criteria: where it is, its name, and what holds it."""
-    shapes = {f"regions[{i}].shape": item.get("shape") for i, item in enumerate(_tables(table, "regions"))}
-    for where, shape in ({"goal": table.get("goal")} | shapes).items():
-        if isinstance(shape, dict) and "centre" in shape and _has_center(shape.get("type")):
+    for where, shape in shapes_in(table).items():
+        if "centre" in shape and takes_key(shape, "center"):
             yield where, "centre", shape
     for i, criterion in enumerate(_tables(table, "criteria")):
         if "colour" in criterion:
@@ -360,8 +359,15 @@ def _tables(table: dict[str, Any], key: str) -> list[dict[str, Any]]:
     return [item if isinstance(item, dict) else {} for item in items] if isinstance(items, list | tuple) else []
 
 
-def _has_center(kind: object) -> bool:
-    """Return True for a shape with the key `center`, which a user's own shape may call `centre`."""
+def shapes_in(table: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the tables of goal and shapes of a scenario's table, by where they are."""
+    shapes = {f"regions[{i}].shape": item.get("shape") for i, item in enumerate(_tables(table, "regions"))}
+    return {where: shape for where, shape in ({"goal": table.get("goal")} | shapes).items() if isinstance(shape, dict)}
+
+
+def takes_key(shape: dict[str, Any], key: str) -> bool:
+    """Return True for a shape with a key, which a user's own shape may call otherwise."""
     from controller.regions.shapes import ENTRIES  # imports NumPy
 
-    return isinstance(kind, str) and kind in ENTRIES and "center" in ENTRIES[kind].units
+    kind = shape.get("type")
+    return isinstance(kind, str) and kind in ENTRIES and key in ENTRIES[kind].units

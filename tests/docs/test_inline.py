@@ -12,15 +12,8 @@ from tests.docs.programs import MODULES, check_foreign, flags, parses, program, 
 PAGES = all_pages()
 # flags of other programs that the pages speak of
 FOREIGN = {
-    "--dialect",
-    "--editable",
-    "--interface-type",
-    "--medium",
-    "--nthreads",
-    "--resolution",
-    "--slow",
-    "--speedup",
-}
+    "--dialect", "--editable", "--interface-type", "--medium", "--nthreads", "--resolution", "--slow", "--speedup",
+}  # fmt: skip
 OURS = set().union(*(known for name in MODULES for known in flags(name).values()))
 
 

@@ -89,12 +89,11 @@ def test_invalid_scenario_numbers_are_rejected_by_key(tmp_path, value):
 @pytest.mark.parametrize(
     ("change", "key"),
     [
-        ("time.duration=1e9", "time.duration"),
-        ("time.step=1e-12", "time.duration"),
+        ("time.duration=1e9", "time.duration"), ("time.step=1e-12", "time.duration"),
         ("arbiter.points=1000000000", "arbiter.points"),
         ("commands.enabled=true\ncommands.obstacles=1000000", "commands.obstacles"),
     ],
-)
+)  # fmt: skip
 def test_excessive_sizes_are_rejected_by_key(change, key):
     with pytest.raises(CosimError, match=key):
         load_scenario("paper", change.split("\n"))

@@ -183,4 +183,6 @@ def test_flood_of_new_addresses_does_not_displace_a_station_that_was_heard(befor
         clock.now += 0.5 * PEER_TIMEOUT
     assert passes(60.0, speaks=True)
     assert passes(silence, speaks=False) == (silence < PEER_TIMEOUT)
+    for _ in range(2 * MAX_PEERS):  # at once: all others that are silent go
+        channel.record_version((HERE, next(ports)), 2)
     assert passes(1.0, speaks=True)

@@ -48,7 +48,7 @@ FIELDS = {
         "vy": round(EAST * 100), "vz": round(DOWN * 100)},
     "VFR_HUD": {"alt": -5.0, "climb": -DOWN, "heading": 115, "throttle": 100},
     "ODOMETRY": {"frame_id": 1, "child_frame_id": 12, "estimator_type": 8, "vx": 0.5, "pose_covariance": math.nan},
-    "SCALED_PRESSURE2": {"press_abs": SURFACE + 1000.0 * 9.80665 * 5.0 / 100.0},
+    "SCALED_PRESSURE2": {"press_abs": SURFACE + 490.3325, "press_diff": 490.3325},  # 5 m of fresh water
     "SCALED_PRESSURE": {"press_abs": SURFACE},
     "ACTUATOR_OUTPUT_STATUS": {"actuator": [0.5, -1.0, 0.0, 1.0, *[0.0] * 28], "active": 0xFF},
     "POSITION_TARGET_LOCAL_NED": {"coordinate_frame": 1, "x": 8.0, "y": 0.0, "z": 5.0},

@@ -74,12 +74,10 @@ for _format, _kind, _parser in (
     reader(f"arbiter in {_format.upper()}", _kind, "fuzzy_arbiter.formats:load", *_parser)(partial(_arbiter, _format))
 
 
-@reader(
-    "table of samples",
-    "text",
-    "fuzzy_arbiter.command_line.evaluation:evaluate_table",
-    "fuzzy_arbiter.command_line.evaluation:_rows",
-)
+_EVALUATION = "fuzzy_arbiter.command_line.evaluation"
+
+
+@reader("table of samples", "text", f"{_EVALUATION}:evaluate_table", f"{_EVALUATION}:_rows")
 def samples(seeds: Seeds) -> Case:
     arbiter = Arbiter()
 
@@ -89,24 +87,18 @@ def samples(seeds: Seeds) -> Case:
     return seeds.file("it.csv", read, b'obstacle,shape, depth,note\n0.75,1,0,a\n1,0.5,0.25,"b,c"\n\n0,0,1e-3,\n')
 
 
-@reader(
-    "scenes",
-    "jsonl",
-    "cosim.campaigns.scenes.scene_file:decode_scene",
-    "cosim.campaigns.scenes.scene_file:SceneStore.__init__",
-)
+LAW, _SCENES = "ismail_dunnigan", "cosim.campaigns.scenes.scene_file"
+
+
+@reader("scenes", "jsonl", f"{_SCENES}:decode_scene", f"{_SCENES}:SceneStore.__init__")
 def scenes(seeds: Seeds) -> Case:
-    gains = LAWS["ismail_dunnigan"].gains_type()
+    gains = LAWS[LAW].gains_type()
 
     def read(path: Path) -> None:
         with SceneStore(path) as store:
             for line in store.lines(store.seeds):  # what is refused then is a row of the campaign
-                with_error = None
-                try:
-                    scene_scenario(decode_scene(line), "ismail_dunnigan", gains, Conditions())
-                except KINDS as error:
-                    with_error = error
-                assert with_error is None or str(with_error).isprintable()
+                refusal = _refusal(lambda line: scene_scenario(decode_scene(line), LAW, gains, Conditions()), line)
+                assert refusal is None or str(refusal).isprintable()
 
     return seeds.file("it.jsonl", read, b"".join(SCENES))
 
@@ -139,9 +131,9 @@ def _zipped(description: bytes) -> bytes:
     return made.getvalue()
 
 
-def _refusal(read: Callable[[Path], object], path: Path) -> Exception | None:
+def _refusal(read: Callable[..., object], *arguments: object) -> Exception | None:
     try:
-        read(path)
+        read(*arguments)
     except KINDS as error:
         return error
     return None
@@ -269,14 +261,11 @@ def dataflash_log(seeds: Seeds) -> Case:
     return _log(seeds, "it.bin", data.replace(b"FRAME_CONFIG", b"FRAME_CONFIX").replace(b"SERVO", b"SERVX"))
 
 
-@reader(
-    "log of PX4",
-    "bytes",
-    "cosim.logs.records:Records._read",
-    "cosim.logs.formats.ulog_messages:ULogMessages._parse",
-    "cosim.logs.formats.ulog_messages:ULogMessages._size_at",
-    "cosim.logs.formats.ulog_messages:_Topic.samples",
-)
+_ULOG = [f"cosim.logs.formats.ulog_messages:{name}" for name in ("ULogMessages._parse", "ULogMessages._size_at",
+                                                                 "_Topic.samples")]  # fmt: skip
+
+
+@reader("log of PX4", "bytes", "cosim.logs.records:Records._read", *_ULOG)
 def ulog(seeds: Seeds) -> Case:
     from tests.cosim.logs.test_px4_logs import Dive, write_ulog
 

@@ -92,9 +92,10 @@ def record(seeds: Seeds) -> Case:
     return seeds.file(RECORD, read, made.getvalue(), folder=True)
 
 
-@reader(
-    "record of a killed run", "bytes", "cosim.results.record:_open_source", "cosim.results.record:_complete_batches"
-)
+_RECORD = "cosim.results.record"
+
+
+@reader("record of a killed run", "bytes", f"{_RECORD}:_open_source", f"{_RECORD}:_complete_batches")
 def stream(seeds: Seeds) -> Case:
     table = pq.read_table(io.BytesIO(record(seeds).contents[0]))
     made = io.BytesIO()
@@ -168,12 +169,7 @@ def results(seeds: Seeds) -> Case:
     return seeds.file(RESULTS, read, of=seeds.comparison / "ismail_dunnigan", folder=True)
 
 
-@reader(
-    "results of a sweep",
-    "parquet",
-    "cosim.campaigns.store.results:Results.__init__",
-    "cosim.campaigns.store.results:Results.row",
-)
+@reader("results of a sweep", "parquet", *_RESULTS[:2])
 def results_of_sweep(seeds: Seeds) -> Case:
     return _with_its_scenario(seeds, RESULTS)
 
