@@ -94,6 +94,8 @@ static void puck(Fmu *f, double h)
 static STATUS begin(Fmu *f)
 {
     memcpy(f->v + POSE, f->v + START, 3 * sizeof f->v[0]);
+    if (f->v[MODE] == OK && f->v[INPUTS] != 0.0)
+        f->v[OUTPUTS] = f->v[GAIN] * f->v[INPUTS];
     return S(OK);
 }
 
@@ -168,6 +170,8 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String token, 
 fmi2Status fmi2SetupExperiment(fmi2Component f, fmi2Boolean a, fmi2Real tolerance, fmi2Real start, fmi2Boolean b, fmi2Real stop)
 {
     (void)a, (void)b;
+    memset(((Fmu *)f)->v, 0, sizeof ((Fmu *)f)->v); /* as FMUs of 20-sim forget what was set before */
+    ((Fmu *)f)->v[GAIN] = 1.0;
     ((Fmu *)f)->v[OUTPUTS] = tolerance;
     ((Fmu *)f)->v[OUTPUTS + 1] = stop;
     ((Fmu *)f)->time = start;
@@ -210,6 +214,8 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
 fmi3Status fmi3EnterInitializationMode(fmi3Instance f, fmi3Boolean a, fmi3Float64 tolerance, fmi3Float64 start, fmi3Boolean b, fmi3Float64 stop)
 {
     (void)a, (void)b;
+    memset(((Fmu *)f)->v, 0, sizeof ((Fmu *)f)->v); /* as FMUs of 20-sim forget what was set before */
+    ((Fmu *)f)->v[GAIN] = 1.0;
     ((Fmu *)f)->v[OUTPUTS] = tolerance;
     ((Fmu *)f)->v[OUTPUTS + 1] = stop;
     ((Fmu *)f)->time = start;

@@ -33,6 +33,11 @@ class LoadedFmu:
 
     def restart(self, fmu: UserFmu, start: Mapping[str, float] | None = None) -> None:
         """Begin again at time 0, with parameters and start values; in a new instance if it cannot be reset."""
+        self.enter_initialization(fmu, start)
+        self.exit_initialization()
+
+    def enter_initialization(self, fmu: UserFmu, start: Mapping[str, float] | None = None) -> None:
+        """Begin again at time 0, and stay in initialization mode."""
         if self.plant.initialized:
             try:
                 self._watched(self.plant.reset)
@@ -44,7 +49,11 @@ class LoadedFmu:
         except PlantError as error:
             raise ScenarioError(f"{fmu.key}.parameters: {error}") from error
         self._watched(lambda: self.plant.set(start or {}))
-        self._watched(self.plant.initialize)
+        self._watched(self.plant.enter_initialization)
+
+    def exit_initialization(self) -> None:
+        """End the initialization mode, and prepare steps."""
+        self._watched(self.plant.exit_initialization)
         try:
             self.plant.prepare_steps(self.period)
         except PlantError as error:
@@ -66,6 +75,10 @@ class LoadedFmu:
     def set(self, name: str, value: float) -> None:
         """Set an input."""
         self._watched(lambda: self.plant.__setitem__(name, value))
+
+    def set_at_once(self, name: str, value: float) -> None:
+        """Set an input of an FMU in initialization mode."""
+        self._watched(lambda: self.plant.set({name: value}))
 
     def step(self, now: float) -> None:
         """Send the inputs, make a step from `now` [s], and get the outputs, from Python."""

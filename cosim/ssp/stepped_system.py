@@ -38,11 +38,14 @@ class SteppedSystem:
         self._open = contextlib.ExitStack()
         self._fmus: dict[str, LoadedFmu] = {}
         try:
-            for name, fmu in fmus.items():  # each with the outputs of those before it
-                loaded = self._open.enter_context(contextlib.closing(LoadedFmu(fmu, step, "time.step")))
-                before = [line for line in self._lines if line.end[0] == name and line.start[0] in self._fmus]
-                loaded.restart(fmu, {line.end[1]: self._sent(line) for line in before})
-                self._fmus[name] = loaded
+            for name, fmu in fmus.items():
+                self._fmus[name] = self._open.enter_context(contextlib.closing(LoadedFmu(fmu, step, "time.step")))
+                self._fmus[name].enter_initialization(fmu)
+            for _ in fmus:  # often enough for values to pass through all of them
+                for line in self._lines:
+                    self._fmus[line.end[0]].set_at_once(line.end[1], self._sent(line))
+            for loaded in self._fmus.values():
+                loaded.exit_initialization()
         except BaseException:
             self.close()
             raise

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from cosim.errors import RunError
+from cosim.ssp.schema import require_valid
 from plant_fmu.unpacking import open_fmu, parse_member
 
 SSD = "SystemStructure.ssd"
@@ -251,7 +252,10 @@ class _Reader:
     # ---- texts ----
 
     def _document(self, member: str) -> ET.Element:
-        return parse_member(f"{self._path}: {member}", self._archive, member)
+        where = f"{self._path}: {member}"
+        root = parse_member(where, self._archive, member)
+        require_valid(where, self._archive.read(member))
+        return root
 
     def _number(self, what: str, text: str) -> float:
         try:

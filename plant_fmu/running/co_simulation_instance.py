@@ -52,7 +52,8 @@ class CoSimulationInstance:
         self._output_index = {name: i for i, name in enumerate(self.outputs.names)}
         self._calls = (*bound.set_inputs, *bound.do_step, *bound.get_outputs)
         self._now, self._ended, self._last = bound.now, bound.ended, bound.last
-        self._terminated = False
+        self._terminated = self._initializing = False
+        self._given: dict[str, Value] = {}  # values that are set before the initialization
         self._set_clock(_AT_ZERO, initialized=False)
 
     def __getattr__(self, name: str) -> Any:
@@ -114,6 +115,8 @@ class CoSimulationInstance:
                     )
         if self.initialized:
             self._read()
+        else:
+            self._given |= by_name
 
     def __setitem__(self, name: str, value: Value) -> None:
         name = present_name(name, self._instance.variables)
@@ -129,9 +132,9 @@ class CoSimulationInstance:
         if name in self._input_index:
             return float(self.inputs.values[self._input_index[name]])
         variable = self._variable(name)
-        if not self.initialized:
+        if not (self.initialized or self._initializing):
             raise PlantError(f"{name} has no value before initialize()")
-        if name in self._output_index:
+        if name in self._output_index and self.initialized:
             return float(self.outputs.values[self._output_index[name]])
         if variable.type in ("Binary", "Clock"):
             raise PlantError(f"{name} is of type {variable.type}, expected a number, Boolean or text")
@@ -165,8 +168,15 @@ class CoSimulationInstance:
 
     def initialize(self, time: float = 0.0, stop_time: float | None = None, tolerance: float | None = None) -> None:
         """Initialize the FMU, and read the outputs; time [s], stop_time [s], relative tolerance of its solver."""
+        self.enter_initialization(time, stop_time, tolerance)
+        self.exit_initialization()
+
+    def enter_initialization(
+        self, time: float = 0.0, stop_time: float | None = None, tolerance: float | None = None
+    ) -> None:
+        """Enter the initialization mode, in which inputs can be set and outputs read until `exit_initialization`."""
         self._require_open()
-        if self.initialized:
+        if self.initialized or self._initializing:
             raise PlantError(f"plant {self.name} is initialized already; reset() it first")
         if self._terminated:
             raise PlantError(f"plant {self.name} is terminated; reset() it first")
@@ -178,20 +188,31 @@ class CoSimulationInstance:
         if tolerance is not None and not _number("tolerance", tolerance, "a number") > 0.0:
             raise PlantError(f"tolerance is {tolerance}, expected a number above 0")
         experiment = {"startTime": time, "stopTime": stop_time, "tolerance": tolerance}
-        instance, fmu = self._instance, self._instance.fmu
+        fmu = self._instance.fmu
+        if self.fmi == 2:
+            self._do_initialize(fmu.setupExperiment, **experiment)
+            self.set(self._given)  # again, since FMUs of 20-sim forget in setupExperiment what was set before
+            experiment = {}
         self._send()
+        self._do_initialize(fmu.enterInitializationMode, **experiment)
+        self._initializing = True
+        self.time = time
+
+    def exit_initialization(self) -> None:
+        """End the initialization mode, and read the outputs."""
+        if not self._initializing:
+            raise PlantError(f"plant {self.name} is not in initialization mode")
+        self._initializing = False
+        self._do_initialize(self._instance.fmu.exitInitializationMode)
+        self._instance.life.running = True
+        self._set_clock(Clock(self.time, 0, math.nan), initialized=True)
+        self._read()
+
+    def _do_initialize(self, call: Any, **arguments: Any) -> None:
         try:
-            if instance.fmi == 2:
-                instance.do(fmu.setupExperiment, **experiment)
-                instance.do(fmu.enterInitializationMode)
-            else:
-                instance.do(fmu.enterInitializationMode, **experiment)
-            instance.do(fmu.exitInitializationMode)
+            self._instance.do(call, **arguments)
         except PlantError as error:
             raise PlantError(f"{error}; reset(), then set valid values") from error
-        instance.life.running = True
-        self._set_clock(Clock(time, 0, math.nan), initialized=True)
-        self._read()
 
     def terminate(self) -> None:
         """End the simulation. Afterwards the plant can be reset or closed; `close` terminates too."""
@@ -205,7 +226,8 @@ class CoSimulationInstance:
         """Return to the state after loading: start values of the FMU, not initialized, time 0."""
         self._require_open()
         self._instance.do(self._instance.fmu.reset)
-        self._instance.life.running = self._terminated = False
+        self._instance.life.running = self._terminated = self._initializing = False
+        self._given.clear()
         self._instance.messages.take_failures()  # so that a later error does not quote earlier messages
         self.inputs.values[:] = self._bound.starts
         self._set_clock(_AT_ZERO, initialized=False)

@@ -104,6 +104,7 @@ class Plant(CoSimulationInstance):
         self._instance.sweep()
         self._instance.do(self._instance.fmu.setFMUState, state.handle(self._instance))
         self.inputs.values[:] = state.inputs
+        self._given.clear()
         self._set_clock(state.clock, initialized=state.initialized)
         if self.initialized:
             self._read()

@@ -79,6 +79,7 @@ SSV = """<s:ParameterSet xmlns:s="http://ssp-standard.org/SSP1/SystemStructurePa
 <s:Parameters><s:Parameter name="first.gain"><s:Real value="3.0"/></s:Parameter>
 <s:Parameter name="first.mode"><s:Real value="0"/></s:Parameter>
 <s:Parameter name="first.at"><s:Real value="0.2"/></s:Parameter></s:Parameters></s:ParameterSet>"""
+MAPPING = """BooleanMappingTransformation><c:MapEntry source="true" target="true"/></c:BooleanMappingTransformation"""
 STEP = ["time.step=0.1"]
 
 
@@ -102,7 +103,7 @@ def test_systems_in_systems_units_and_parameters(gain, tmp_path):
     """Two gains in a circle, through kilometers, a linear transformation and the connectors of a system."""
     folder, summary = run_system(write_system(tmp_path / "two.ssp", gain), tmp_path / "run", STEP)
     record = pq.read_table(folder / "record.parquet")
-    first, second = [0.0], [0.0]
+    first, second = [3.0], [0.0]  # the offset of the second line reaches the first FMU while all of them initialize
     for _ in range(5):
         first, second = [*first, 3.0 * (500.0 * second[-1] + 1.0)], [*second, -1.0 * first[-1] / 1000.0]
     np.testing.assert_allclose(record["first.y"], first, rtol=1e-15)
@@ -119,17 +120,21 @@ def test_systems_in_systems_units_and_parameters(gain, tmp_path):
         ('name="inner"', 'name="first"', "name 'first' of a System is empty or taken"),
         ('endConnector="u">', 'endConnector="v">', "first: first.fmu has no variable 'v'"),
         ('startConnector="y" endE', 'startConnector="gain" endE', "first.gain is connected, but of causality"),
-        ("LinearTransformation", "BooleanMappingTransformation", "first.u: BooleanMappingTransformation is not"),
+        ('LinearTransformation factor="500.0" offset="1.0"/', MAPPING, "first.u: BooleanMappingTransformation is not"),
         ('m="1" factor', 's="1" factor', "inner.in is in 'km', which 'm' of first.y is not"),
         ('<c:Unit name="km">', '<c:Unit name="mm">', "inner.in is in 'km', expected 'm' of first.y"),
         ('source="set.ssv"', 'source="none.ssv"', "ParameterBinding: source is 'none.ssv', expected a file in it"),
         ("second.gain", "third.gain", "parameter inner.third.gain is of no FMU and no connector"),
-        ('value="-1.0"', 'value="much"', "parameter second.gain is 'much', expected a finite"),
+        ('value="-1.0"', 'value="INF"', "parameter second.gain is 'INF', expected a finite"),
+        ('value="-1.0"', 'value="much"', "line 15: Element 'Real', attribute 'value': 'much' is not a valid value"),
+        ('kind="input"', 'kind="in"', "line 9: Element 'Connector', attribute 'kind': [facet 'enumeration']"),
+        ('name="first" ', "", "line 8: Element 'Component': The attribute 'name' is required but missing"),
+        ('factor="500.0"', 'scale="500.0"', "Element 'LinearTransformation', attribute 'scale': The attribute 'scale' is not"),
         ('<v:Real value="-1.0"/>', '<v:Enumeration value="one"/>', "second.gain is of type Enumeration, expected"),
         ("second.gain", "second.gian", "FMU variable 'gian' is unknown; did you mean 'gain'"),
         ('stopTime="0.5"', "", "time.duration is not stated, expected seconds above 0, such as by --set time.duration"),
         ('startTime="0.0"', 'startTime="5"', "startTime is 5 s, expected 0"),
-        ("<Elements>", '<Elements><SignalDictionaryReference name="bus"/>', "bus is a SignalDictionaryReference"),
+        ("<Elements>", '<Elements><SignalDictionaryReference name="bus" dictionary="d"/>', "bus is a SignalDictionaryReference"),
         ('startElement="second" startConnector="y" endC', 'startConnector="out" endC', "connected in a cycle"),
         ("</System>", "", "is no XML that can be read"),
     ],
