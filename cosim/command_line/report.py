@@ -39,7 +39,6 @@ def report(options: argparse.Namespace) -> int:
     from controller import ControllerError
     from cosim.errors import CosimError
     from cosim.replay.pages import replay
-    from cosim.results.wording import verdict
     from cosim.run.run_folder import report_again
     from plant_fmu import PlantFmuError
 
@@ -51,11 +50,11 @@ def report(options: argparse.Namespace) -> int:
     status = 0
     for folder in options.folders:
         try:
-            summary, files = report_again(folder, options.format or ["html"])
+            outcome, files = report_again(folder, options.format or ["html"])
         except (CosimError, ControllerError, PlantFmuError) as error:
             print_status(str(error))
             status = FAULT
             continue
-        say(options, verdict(summary))
+        say(options, outcome)
         print(*files, sep="\n")
     return status

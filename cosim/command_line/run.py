@@ -83,16 +83,17 @@ def _run_system(options: argparse.Namespace) -> int:
     """Run a system of FMUs."""
     from cosim.io.strict_json import json_text
     from cosim.results.record import RECORD
+    from cosim.results.run_result import REPORT
     from cosim.run.run_system import run_system
 
     refuse_flags(options, _OF_SCENARIOS, "a scenario with it: a system of FMUs runs alone")
-    folder, summary = run_system(Path(options.scenario), options.out, options.set)
+    run = run_system(Path(options.scenario), options.out, options.set, report=not options.no_report)
     if options.json:
-        print(json_text({"folder": str(folder), "summary": summary}), end="")
+        print(json_text({"folder": str(run.folder), "summary": run.summary}), end="")
     else:
-        say(options, f"{summary['status']}: {summary['steps']} steps, {summary['simulated_time']:g} s")
-        print(folder / RECORD)
-    return INTERRUPTED if summary["status"] == "interrupted" else 0
+        say(options, run.outcome)
+        print(run.folder / (RECORD if options.no_report else REPORT))
+    return INTERRUPTED if run.summary["status"] == "interrupted" else 0
 
 
 def _json(run: Run) -> str:

@@ -16,6 +16,7 @@ from cosim.errors import ExportError
 from cosim.io.strict_json import json_text
 from cosim.results.record import Rows
 from cosim.results.run_result import SCENARIO, Run, load_run
+from cosim.results.system_run import SystemRun, is_of_system, load_system_run
 from cosim.simulation.signals import Column
 from plant_fmu.toml_tables import MAX_COMPARED
 
@@ -26,21 +27,33 @@ _ROUNDING = 1e-6  # periods, tolerance of the comparison of times and ticks
 class Excerpt:
     """A run with the selection of its signals and steps."""
 
-    run: Run
+    source: Run | SystemRun
     indices: tuple[int, ...]  # indices of the signals in a row of the record, rising, `time` included
     every: int  # export every n-th step, from the first one on
     rate: float | None = None  # Hz, steps per simulated second instead of `every`
 
     @property
+    def run(self) -> Run:
+        """The run of a scenario; raise `ExportError` if it is that of a system of FMUs."""
+        if isinstance(self.source, SystemRun):
+            raise ExportError(
+                f"{self.source.folder}: holds a run of a system of FMUs, which has no known vehicle; "
+                "expected --to csv or mcap with it"
+            )
+        return self.source
+
+    @property
     def columns(self) -> tuple[Column, ...]:
         """Columns of the selected signals, in the order of the record."""
-        return tuple(self.run.record.columns[i] for i in self.indices)
+        return tuple(self.source.record.columns[i] for i in self.indices)
 
     @property
     def texts(self) -> dict[str, str]:
         """Scenario file of the run folder, and summary as JSON with null for NaN and infinity, by file name."""
-        scenario = (self.run.folder / SCENARIO).read_text(encoding="utf-8")
-        return {"scenario.toml": scenario, "summary.json": json_text(self.run.summary)}
+        summary = {"summary.json": json_text(self.source.summary)}
+        if isinstance(self.source, SystemRun):
+            return summary
+        return {"scenario.toml": (self.source.folder / SCENARIO).read_text(encoding="utf-8")} | summary
 
     @cached_property
     def count(self) -> int:
@@ -50,7 +63,7 @@ class Excerpt:
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Rows]:
         """Yield the exported steps with the signals `names`, default all, in blocks that fit into memory."""
         first, began, tick = 0, None, -1.0
-        for block in self.run.record.blocks(names if names is None or self.rate is None else ["time", *names]):
+        for block in self.source.record.blocks(names if names is None or self.rate is None else ["time", *names]):
             if self.rate is None:
                 here = np.arange(-first % self.every, len(block), self.every)
             else:
@@ -74,7 +87,7 @@ class Excerpt:
 
 def excerpt_of(folder: Path, signals: Sequence[str] = (), every: int = 1, rate: float | None = None) -> Excerpt:
     """Select signals and steps of a run for export; rate [Hz]."""
-    run = load_run(folder)
+    run = load_system_run(folder) if is_of_system(folder) else load_run(folder)
     names = [column.name for column in run.record.columns]
     selected = (
         {name for pattern in signals for name in _match_names(pattern, names)} | {"time"} if signals else {*names}

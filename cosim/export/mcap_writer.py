@@ -26,6 +26,7 @@ from cosim.replay.activity import active_at
 from cosim.replay.events import events_of
 from cosim.results.record import Rows
 from cosim.results.run_result import Run
+from cosim.results.system_run import SystemRun
 
 PACKAGE = "subreach"  # Protobuf package of the signals' schemas
 _CHUNK = 4 * 2**20  # bytes
@@ -49,19 +50,22 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
 
 
 def _write_messages(writer: Writer, excerpt: Excerpt) -> None:
-    scene, tables = Scene(excerpt), _tables(writer, excerpt)
-    drawing = _Drawing(writer, excerpt.run, scene)
-    drawing.begin()
+    tables = _tables(writer, excerpt)
+    drawing = None if isinstance(excerpt.source, SystemRun) else _Drawing(writer, excerpt.run, Scene(excerpt))
+    if drawing:
+        drawing.begin()
     for rows in excerpt.blocks():
         block = rows.to_array()
         times = np.rint(block[:, 0] * 1e9).astype(np.int64).tolist()
         messages = zip(*(numbers_messages(block[:, indices]) for _, indices in tables), strict=True)
-        draw = drawing.row_writer(rows)
+        draw = drawing.row_writer(rows) if drawing else None
         for i, (time, row) in enumerate(zip(times, messages, strict=True)):
             for (channel, _), message in zip(tables, row, strict=True):
                 writer.add_message(channel, time, message, time)
-            draw(i, time)
-    drawing.end()
+            if draw:
+                draw(i, time)
+    if drawing:
+        drawing.end()
 
 
 def _tables(writer: Writer, excerpt: Excerpt) -> list[tuple[int, list[int]]]:

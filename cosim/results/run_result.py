@@ -30,6 +30,7 @@ SUMMARY = "summary.json"
 COMMANDS_LOG = "commands.jsonl"
 REPORT = "report.html"
 REPLAY = "replay.html"
+SYSTEM = "system.ssp"  # copy of a system of FMUs that was run
 
 _MAX_WALL_TIME = 1e12  # s, bound of a plausible wall-clock time
 
@@ -170,6 +171,10 @@ def load_run(path: str | Path) -> Run:
     'completed'
     """
     path = Path(path)
+    if (path / SYSTEM).is_file():
+        raise RunError(
+            f"{path}: holds a run of a system of FMUs, which has no known vehicle; expected a scenario's run"
+        )
     if not (path / SCENARIO).is_file():
         raise RunError(f"{path}: holds no run ({SCENARIO} is missing)")
     scenario = load_scenario(path / SCENARIO, imported=True)

@@ -18,16 +18,17 @@ from cosim.io.strict_json import json_text
 from cosim.replay.pages import write_replay
 from cosim.report.figure_process import FigureProcess
 from cosim.report.report_files import write_report
+from cosim.report.system_report import write_system_report
 from cosim.report.web_page import FIGURES
 from cosim.results.file_copies import VEHICLE_COPY, files_of
 from cosim.results.log_facts import IMPORT
 from cosim.results.record import RECORD, STREAM, load_record, require_utf8
 from cosim.results.recorder import Recorder
-from cosim.results.run_result import COMMANDS_LOG, REPLAY, REPORT, SCENARIO, SUMMARY, Run, load_run, open_run
+from cosim.results.run_result import COMMANDS_LOG, REPLAY, REPORT, SCENARIO, SUMMARY, SYSTEM, Run, load_run, open_run
+from cosim.results.system_run import is_of_system, load_system_run
+from cosim.results.wording import verdict
 from cosim.scenario.scenario import Scenario
 from plant_fmu.archive import is_temporary, temporary_folder
-
-SYSTEM = "system.ssp"  # copy of a system of FMUs that was run
 
 _OUTPUT_NAMES = frozenset(
     {SCENARIO, SYSTEM, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD, STREAM, SUMMARY, REPORT, REPLAY, FIGURES}
@@ -154,7 +155,7 @@ def _remove_run(path: Path) -> None:
         for file in path.iterdir()
         if not (file in files or file.match("report*.*") or is_temporary(file.name))
     )
-    if odd or not (path / SCENARIO).is_file():
+    if odd or not ((path / SCENARIO).is_file() or is_of_system(path)):
         what = f"{odd[0]!r}, which no run makes" if odd else "no run"
         raise RunError(f"{path}: holds {what}; expected a run to be replaced, or a new folder")
     with temporary_folder(f".{path.name}-", path.parent) as aside:
@@ -189,17 +190,26 @@ def conclude(
     return run
 
 
-def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict[str, Any], list[Path]]:
-    """Write summary and report of a run that was completed, interrupted or killed."""
-    run = load_run(path)
+def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[str, list[Path]]:
+    """Write summary and report of a run that was completed, interrupted or killed; return its outcome and the files."""
     try:
-        return run.summary, _write(run, formats)
+        if is_of_system(path):
+            system_run = load_system_run(path)
+            pages = write_system_report(system_run, formats)
+            return system_run.outcome, [*pages[:1], write_summary(path, system_run.summary), *pages[1:]]
+        run = load_run(path)
+        return verdict(run.summary), _write(run, formats)
     except OSError as error:
         raise RunError(f"{path}: {error.strerror or error}") from error
 
 
+def write_summary(path: Path, summary: Mapping[str, Any]) -> Path:
+    """Write the summary of a run into its folder; return the file."""
+    return write_atomic(path / SUMMARY, json_text(summary))
+
+
 def _write(run: Run, formats: Collection[str], figure_process: FigureProcess | None = None) -> list[Path]:
-    summary = write_atomic(run.folder / SUMMARY, json_text(run.summary))
+    summary = write_summary(run.folder, run.summary)
     pages = write_report(run, formats, figure_process) if formats else []
     replay = [write_replay(run)] if "html" in formats else []
     return [*pages[:1], *replay, summary, *pages[1:]]

@@ -6,14 +6,13 @@ import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_atomic
-from cosim.io.strict_json import json_text
+from cosim.report.system_report import write_system_report
 from cosim.results.recorder import Recorder
-from cosim.results.run_result import SUMMARY
-from cosim.run.run_folder import SYSTEM, claim_folder
+from cosim.results.run_result import SYSTEM
+from cosim.results.system_run import SystemRun, load_system_run
+from cosim.run.run_folder import claim_folder, write_summary
 from cosim.scenario.toml_file import split_change
 from cosim.ssp.stepped_system import SteppedSystem
 from cosim.ssp.structure import identifier
@@ -25,9 +24,9 @@ _MAX_STEPS = 10**9
 
 
 def run_system(
-    path: Path, out: Path | None = None, changes: Sequence[str] = (), overwrite: bool = False
-) -> tuple[Path, dict[str, Any]]:
-    """Run an SSP file; return the folder with the record, and the summary."""
+    path: Path, out: Path | None = None, changes: Sequence[str] = (), overwrite: bool = False, report: bool = True
+) -> SystemRun:
+    """Run an SSP file; write record, summary and report into a folder."""
     system = read_system(path)
     step, steps = _times(path, system, changes)
     with temporary_folder("cosim-") as scratch, SteppedSystem(path, system, step, scratch) as stepped:
@@ -50,10 +49,13 @@ def run_system(
             raise failure or KeyboardInterrupt
         summary = {"system": system.name, "status": status, "step": step, "steps": recorder.rows - 1,
                    "simulated_time": (recorder.rows - 1) * step, "wall_time": wall_time}  # fmt: skip
-        write_atomic(folder.path / SUMMARY, json_text(summary))
+        write_summary(folder.path, summary)
     if failure:
         raise failure
-    return folder.path, summary
+    run = load_system_run(folder.path)
+    if report:
+        write_system_report(run, ["html"])
+    return run
 
 
 def _times(path: Path, system: SystemDescription, changes: Sequence[str]) -> tuple[float, int]:

@@ -10,7 +10,7 @@ from plant_fmu.component import Component
 from plant_fmu.markup import xml_text
 
 _NAMESPACE = "https://open-simulation-platform.com/OspModelDescription/1.0.0"
-_LAST = re.compile(r"(?:\.[^.\[\]]+|\[\d+\])$")  # last part of a structured name
+LAST_PART = re.compile(r"(?:\.[^.\[\]]+|\[\d+\])$")  # last part of a structured name
 
 
 def osp_model_description(component: Component, names: Iterable[str]) -> str:
@@ -19,7 +19,7 @@ def osp_model_description(component: Component, names: Iterable[str]) -> str:
     groups: dict[tuple[str, bool], list[str]] = {}
     for v in component.variables:
         if v.name in connectors:
-            groups.setdefault((_LAST.sub("", v.name), v.role == "input"), []).append(v.name)
+            groups.setdefault((LAST_PART.sub("", v.name), v.role == "input"), []).append(v.name)
     root = ET.Element("OspModelDescription", xmlns=_NAMESPACE, version="1.0")
     group_list = ET.SubElement(root, "VariableGroups")
     for (name, is_input), members in groups.items():

@@ -10,6 +10,7 @@ import pytest
 
 from cosim.command_line.cli import main
 from cosim.results.record import load_record
+from cosim.results.run_result import load_run
 from cosim.run.run_folder import report_again
 from tests.cosim.mavlink.stubs import free_port
 from tests.cosim.sitl.stand_in import NEUTRAL, StandIn
@@ -71,5 +72,6 @@ def test_regenerated_report_names_the_autopilot(serve):
         for _ in range(60):
             pilot.fly(NEUTRAL)
     (run,) = served.outcome().runs
-    assert report_again(run.folder)[0]["law"] == "ardupilot"
+    report_again(run.folder)
+    assert load_run(run.folder).summary["law"] == "ardupilot"
     assert "; ardupilot law." in (run.folder / "report.html").read_text()

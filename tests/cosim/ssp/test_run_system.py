@@ -7,6 +7,7 @@ import fmpy
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from mcap.reader import make_reader
 
 from cosim.command_line.cli import main
 from cosim.errors import RunError
@@ -80,6 +81,7 @@ SSV = """<s:ParameterSet xmlns:s="http://ssp-standard.org/SSP1/SystemStructurePa
 <s:Parameter name="first.mode"><s:Real value="0"/></s:Parameter>
 <s:Parameter name="first.at"><s:Real value="0.2"/></s:Parameter></s:Parameters></s:ParameterSet>"""
 MAPPING = """BooleanMappingTransformation><c:MapEntry source="true" target="true"/></c:BooleanMappingTransformation"""
+BUS = '<Elements><SignalDictionaryReference name="bus" dictionary="d"/>'
 STEP = ["time.step=0.1"]
 
 
@@ -101,14 +103,43 @@ def write_system(path, gain, ssd=SSD, ssv=SSV):
 @pytest.mark.medium
 def test_systems_in_systems_units_and_parameters(gain, tmp_path):
     """Two gains in a circle, through kilometers, a linear transformation and the connectors of a system."""
-    folder, summary = run_system(write_system(tmp_path / "two.ssp", gain), tmp_path / "run", STEP)
-    record = pq.read_table(folder / "record.parquet")
+    run = run_system(write_system(tmp_path / "two.ssp", gain), tmp_path / "run", STEP)
+    record, summary = pq.read_table(run.folder / "record.parquet"), run.summary
     first, second = [3.0], [0.0]  # the offset of the second line reaches the first FMU while all of them initialize
     for _ in range(5):
         first, second = [*first, 3.0 * (500.0 * second[-1] + 1.0)], [*second, -1.0 * first[-1] / 1000.0]
     np.testing.assert_allclose(record["first.y"], first, rtol=1e-15)
     np.testing.assert_allclose(record["inner.second.y"], second, rtol=1e-15)
     assert (summary["status"], summary["steps"], summary["system"]) == ("completed", 5, "two")
+    page = (run.folder / "report.html").read_text()
+    assert all(part in page for part in ("figures/first-1.svg", "figures/inner.second-1.svg", "completed: 5 steps"))
+    assert "<td>first.y</td><td>0.001</td>" in page
+
+
+def test_a_run_is_exported_and_reported_again_as_far_as_it_has_no_vehicle(gain, tmp_path, capsys, monkeypatch):
+    """Also a killed one, without summary and figures."""
+    monkeypatch.chdir(tmp_path)
+    run_system(write_system(tmp_path / "two.ssp", gain), tmp_path / "run", STEP, report=False)
+    (tmp_path / "run" / "summary.json").unlink()
+    assert main(["report", "run", "--format", "html,png"]) == 0
+    assert "killed: 5 steps" in (tmp_path / "run" / "report.html").read_text()
+    assert (tmp_path / "run" / "figures" / "first-1.png").stat().st_size > 1000
+    assert main(["export", "run", "--to", "csv", "--signals", "first.*"]) == 0
+    assert main(["export", "run", "--to", "mcap"]) == 0
+    assert (tmp_path / "run.csv").read_text().splitlines()[:2] == ["time,first.y", "0.0,3.0"]
+    with (tmp_path / "run.mcap").open("rb") as file:
+        assert make_reader(file).get_summary().statistics.message_count == 3 * 6
+    capsys.readouterr()
+    for arguments in (
+        ["export", "run", "--to", "tlog"],
+        ["export", "run", "--to", "rrd"],
+        ["report", "run", "--replay"],
+    ):
+        assert main(arguments) == 2
+        message = capsys.readouterr().err
+        assert (
+            "run: holds a run of a system of FMUs, which has no known vehicle" in message and message.count("\n") == 1
+        )
 
 
 @pytest.mark.parametrize(
@@ -129,12 +160,12 @@ def test_systems_in_systems_units_and_parameters(gain, tmp_path):
         ('value="-1.0"', 'value="much"', "line 15: Element 'Real', attribute 'value': 'much' is not a valid value"),
         ('kind="input"', 'kind="in"', "line 9: Element 'Connector', attribute 'kind': [facet 'enumeration']"),
         ('name="first" ', "", "line 8: Element 'Component': The attribute 'name' is required but missing"),
-        ('factor="500.0"', 'scale="500.0"', "Element 'LinearTransformation', attribute 'scale': The attribute 'scale' is not"),
+        ('factor="500.0"', 'scale="500.0"', "'LinearTransformation', attribute 'scale': The attribute 'scale' is not"),
         ('<v:Real value="-1.0"/>', '<v:Enumeration value="one"/>', "second.gain is of type Enumeration, expected"),
         ("second.gain", "second.gian", "FMU variable 'gian' is unknown; did you mean 'gain'"),
         ('stopTime="0.5"', "", "time.duration is not stated, expected seconds above 0, such as by --set time.duration"),
         ('startTime="0.0"', 'startTime="5"', "startTime is 5 s, expected 0"),
-        ("<Elements>", '<Elements><SignalDictionaryReference name="bus" dictionary="d"/>', "bus is a SignalDictionaryReference"),
+        ("<Elements>", BUS, "bus is a SignalDictionaryReference"),
         ('startElement="second" startConnector="y" endC', 'startConnector="out" endC', "connected in a cycle"),
         ("</System>", "", "is no XML that can be read"),
     ],
