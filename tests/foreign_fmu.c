@@ -214,8 +214,6 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
 fmi3Status fmi3EnterInitializationMode(fmi3Instance f, fmi3Boolean a, fmi3Float64 tolerance, fmi3Float64 start, fmi3Boolean b, fmi3Float64 stop)
 {
     (void)a, (void)b;
-    memset(((Fmu *)f)->v, 0, sizeof ((Fmu *)f)->v); /* as FMUs of 20-sim forget what was set before */
-    ((Fmu *)f)->v[GAIN] = 1.0;
     ((Fmu *)f)->v[OUTPUTS] = tolerance;
     ((Fmu *)f)->v[OUTPUTS + 1] = stop;
     ((Fmu *)f)->time = start;

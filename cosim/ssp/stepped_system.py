@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from pathlib import Path
 from typing import Self
 
 import numpy as np
 
-from cosim.errors import RunError
+from cosim.errors import RunError, ScenarioError
 from cosim.scenario.fmu_tables import UserFmu
 from cosim.simulation.fmu_map import read_fmu_of
 from cosim.simulation.loaded_fmu import LoadedFmu
@@ -31,7 +32,11 @@ class SteppedSystem:
     def __init__(self, archive: Path, system: SystemDescription, step: float, folder: Path) -> None:
         fmus = {name: UserFmu(f"components.{name}", file, {}, {}, system.parameters[name], _TIMEOUT, {})
                 for name, file in extract_fmus(archive, system, folder).items()}  # fmt: skip
-        self._files = {name: read_fmu_of(fmu) for name, fmu in fmus.items()}
+        try:
+            self._files = {name: read_fmu_of(fmu) for name, fmu in fmus.items()}
+        except ScenarioError as error:
+            text = str(error).removeprefix("components.").replace(f"{folder}{os.sep}", "")
+            raise RunError(f"{archive}: {text}") from error
         self._step, self._k, self._lines = step, 0, system.lines
         for line in self._lines:
             _check_line(line, *(_variable(self._files, port) for port in (line.start, line.end)))

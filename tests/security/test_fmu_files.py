@@ -82,7 +82,7 @@ EXTERNAL = '<!DOCTYPE x SYSTEM "file:///etc/passwd">'
 @pytest.mark.parametrize(
     ("members", "words"),
     [
-        *(([(name, "x")], "leads out|no name of a file") for name in OUTSIDE),
+        *(([(name, "x")], "leads out|no name of a file|has a backslash") for name in OUTSIDE),
         ([(LINK, "/tmp")], "leads out"),
         *(([(name, f"{i}") for i, name in enumerate(names)], "would be written over") for names in TWICE),
         ([("sources/buildDescription.xml", f"{EXTERNAL}<x/>")], r"buildDescription\.xml is no XML that can be read"),
