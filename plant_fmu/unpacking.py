@@ -149,7 +149,9 @@ def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
         if len(name) > MAX_NAME:
             raise FmuFileError(f"{path}: refused: a file's name has {len(name)} characters, expected {MAX_NAME}")
         is_link = member.external_attr >> 16 & 0o170000 == 0o120000
-        if is_link or "\\" in name or ":" in name or name.startswith("/") or ".." in PurePosixPath(name).parts:
+        if "\\" in name:
+            raise FmuFileError(f"{path}: refused: {name!r} has a backslash, expected / between folders")
+        if is_link or ":" in name or name.startswith("/") or ".." in PurePosixPath(name).parts:
             raise FmuFileError(f"{path}: refused: {name!r} leads out of the folder it is extracted to")
         if not name.isprintable():
             raise FmuFileError(f"{path}: refused: {name!r} is no name of a file")

@@ -26,7 +26,7 @@ def law_fmu_findings(scenario: Scenario, fmu: UserFmu) -> Iterator[Finding]:
     except ScenarioError as error:
         yield _failure("law", "FMU", error)
         return
-    text = f"{file.path.name} sets the {output} by {len(targets)} outputs, from {len(connected)} inputs"
+    text = f"{file.path.name} sets the {output} by {len(targets)} of its outputs, from {len(connected)} of its inputs"
     yield Finding("law", "FMU", "holds", f"{text}; units and directions fit.")
     yield from _free_inputs("law", "inputs", file, connected)
     yield _step_finding("law", "step", file, "time.control", scenario.time.control)
@@ -46,11 +46,11 @@ def component_findings(scenario: Scenario) -> Iterator[Finding]:
         yield _failure("components", "FMU", error)
         return
     for one in maps:
-        name, text = one.fmu.name, f"{one.file.path.name} receives {len(one.inputs)} inputs"
+        name, text = one.fmu.name, f"{one.file.path.name} has {len(one.inputs)} of its inputs connected"
         if one.fmu is scenario.plant_fmu:
-            text += f", gives {len(targets)} outputs of the vehicle, and starts by {len(start)} values"
+            text += f", gives {len(targets)} of the vehicle's outputs, and starts by {len(start)} of its values"
         else:
-            text += f", sets {len(one.sent)} inputs of the plant and {len(one.received - {*one.sent})} of others"
+            text += f", sets {len(one.sent)} of the plant's inputs and {len(one.received - {*one.sent})} of others'"
         yield Finding("components", name, "holds", f"{text}; units and directions fit.")
         yield from _free_inputs("components", f"{name} inputs", one.file, one.inputs)
         yield _step_finding("components", f"{name} step", one.file, "time.step", scenario.time.step)
