@@ -2,5 +2,5 @@
 
 Sentences, tables and figures as one HTML file, and figures as SVG and PNG. Public: `write_report`.
 
-Imports: controller, plant_fmu, replay, results, scenario, simulation.
+Imports: controller, plant_fmu, replay, results, scenario, simulation, ssp.
 """
