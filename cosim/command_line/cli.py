@@ -196,11 +196,9 @@ def _log(verbose: bool) -> None:
 
 
 _ERRORS = {
-    "controller": "ControllerError",
-    "cosim": "CosimError",
-    "fuzzy_arbiter": "ArbiterError",
+    "controller": "ControllerError", "cosim": "CosimError", "fuzzy_arbiter": "ArbiterError",
     "plant_fmu": "PlantFmuError",
-}
+}  # fmt: skip
 # verbs that no longer exist, and what replaces them
 _REMOVED = {
     "calibrate": "python -m benchmarks calibration repeats the fit of paper-calibrated",

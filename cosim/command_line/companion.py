@@ -64,13 +64,8 @@ def add_verbs(verbs: Any) -> None:
     flag(verb, "--level-dive M", "an ArduSub's dive after arming, to align its heading", float_range(0.0, 10.0), 0.6)
     flag(verb, "--least-battery PERCENT", "charge below which the vehicle holds still", float_range(0.0, 100.0), 0.0)
     system = int_range(1, 255)
-    flag(
-        verb,
-        "--system-id N",
-        "own system id; an ArduSub takes sticks of SYSID_MYGCS or MAV_GCS_SYSID alone",
-        system,
-        255,
-    )
+    words = "own system id; an ArduSub takes sticks of SYSID_MYGCS or MAV_GCS_SYSID alone"
+    flag(verb, "--system-id N", words, system, 255)
     flag(verb, "--vehicle-system N", "the autopilot's system id (default: that of the first one heard)", system)
     flag(verb, "--timeout S", "end if steering cannot begin in so many seconds", float_range(0.1, 1e6))
     flag(verb, "--speedup N", "seconds of a simulated autopilot per second", float_range(0.01, 100.0), 1.0)

@@ -10,13 +10,8 @@ from typing import Any
 from cosim.command_line.flags import add_verb, flag, float_range, int_range, refuse_flags
 from cosim.command_line.process import say
 
-_EXCITATION: dict[str, Any] = {
-    "box": (10.0, 10.0, 4.0),
-    "depth": 3.0,
-    "time": 300.0,
-    "current": 0.1,
-    "seed": 0,
-}  # default values
+# default values
+_EXCITATION: dict[str, Any] = {"box": (10.0, 10.0, 4.0), "depth": 3.0, "time": 300.0, "current": 0.1, "seed": 0}
 
 
 def add_verbs(verbs: Any) -> None:
@@ -86,13 +81,8 @@ def _fit(
         options.runs, options.vehicle, free, nuisance, options.held_out, progress, options.measured_attitude
     )
     posterior, page = write_results(done, options.out)
-    return [
-        findings.verdict(done.fit),
-        *summary_lines(done),
-        *findings.warnings(done.fit, done.logs),
-        str(posterior),
-        str(page),
-    ]
+    warnings = findings.warnings(done.fit, done.logs)
+    return [findings.verdict(done.fit), *summary_lines(done), *warnings, str(posterior), str(page)]
 
 
 def _excite(
@@ -107,16 +97,7 @@ def _excite(
     excitation_page.require_empty(options.out)
     given = {name: getattr(options, name) for name in _EXCITATION if getattr(options, name) is not None}
     box, depth, time, current, seed = (_EXCITATION | given).values()
-    done = design(
-        options.vehicle,
-        tuple(box),
-        depth,
-        time,
-        DEFAULT_FREE if free is None else free,
-        nuisance,
-        seed,
-        progress,
-        current,
-    )
+    free = DEFAULT_FREE if free is None else free
+    done = design(options.vehicle, tuple(box), depth, time, free, nuisance, seed, progress, current)
     page = excitation_page.write_folder(done, options.out)
     return [excitation_page.verdict(done), *excitation_page.warnings(done), str(page)]

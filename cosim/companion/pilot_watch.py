@@ -47,10 +47,8 @@ class PilotWatch:
             case "MANUAL_CONTROL":
                 target, is_deflected = message.target, _is_deflected(message, reported.autopilot)
             case "RC_CHANNELS_OVERRIDE":
-                target, is_deflected = (
-                    message.target_system,
-                    bool((np.abs(_pulses(message) - CENTER) > _TOLERANCE).any()),
-                )
+                is_deflected = bool((np.abs(_pulses(message) - CENTER) > _TOLERANCE).any())
+                target = message.target_system
             case "RC_CHANNELS" if (system, component, reported.autopilot) == (reported.system, 1, _ARDUPILOT):
                 target, is_deflected = 0, self._has_foreign(_pulses(message), now)
             case _:

@@ -19,12 +19,8 @@ from fuzzy_arbiter.shapes import Membership
 from plant_fmu.toml_tables import hint
 
 Quantity = Literal["ramp", "clearance", "angle", "approach_time"]
-QUANTITIES: dict[str, str] = {  # argument of a membership function, and its unit
-    "ramp": "m, rad",
-    "clearance": "m",
-    "angle": "rad",
-    "approach_time": "s",
-}
+# arguments of membership functions, and their units
+QUANTITIES: dict[str, str] = {"ramp": "m, rad", "clearance": "m", "angle": "rad", "approach_time": "s"}
 MAX_CRITERIA = 16
 # for criteria without a color: Okabe and Ito's purple, then muted ones of Tol's
 _COLORS = ("#CC79A7", "#882255", "#44AA99", "#999933", "#332288", "#88CCEE", "#AA4499", "#117733")

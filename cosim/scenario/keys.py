@@ -96,11 +96,9 @@ def hint_of_key(name: str, vehicle: object) -> str:
             keys |= {f"plant.parameters.{name.partition('[')[0]}" for name in names}
     similarity = {key: difflib.SequenceMatcher(None, name, key.rpartition(".")[2]).ratio() for key in sorted(keys)}
     near = [key for key in sorted(similarity, key=similarity.__getitem__, reverse=True) if similarity[key] >= _SIMILAR]
-    return (
-        f"did you mean {' or '.join(near[:_MAX_PROPOSED])}?"
-        if near
-        else f"expected one of {', '.join(File.__struct_fields__)}"
-    )
+    if near:
+        return f"did you mean {' or '.join(near[:_MAX_PROPOSED])}?"
+    return f"expected one of {', '.join(File.__struct_fields__)}"
 
 
 _GAIN = re.compile(r"^ +(\w+): float = [^#\n]*# (.*)$", re.M)

@@ -138,10 +138,7 @@ class Scenario:
             defaults = LAWS[self.law.name].gains_type()._asdict() if self.law.name in LAWS else {}
             gains = dict(table["law"]["gains"].items() - defaults.items())
             table = without_defaults(table | {"law": table["law"] | {"gains": gains}})
-        return scenario_text(
-            table,
-            comments(self.law.name, self.vehicle) if commented else {},
-        )
+        return scenario_text(table, comments(self.law.name, self.vehicle) if commented else {})
 
     def replace(self, changes: Mapping[str, Any]) -> Scenario:
         """Return a scenario with other values of some keys.

@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -30,6 +30,8 @@ from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.toml_tables import decode, hint
 from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle
+
+_Fmu = TypeVar("_Fmu", bound=FmuTable)
 
 ROUNDING = 1e-6  # tolerance of a multiple of the step, as a fraction of the step
 _LEVEL = 1e-6  # cosine of the vertical up to which an attitude is level
@@ -162,19 +164,11 @@ def obstacle_slots(file: File) -> tuple[SecondaryRegion, ...]:
     _require(not of_python, "commands.enabled", "true", f"false with {law.name}: laws of Python take no commands")
     slots = [f"seen {i}" for i in range(1, commands.obstacles + 1)]
     for i, entry in enumerate(file.regions):
-        _require(
-            entry.name not in slots,
-            f"regions[{i}].name",
-            repr(entry.name),
-            "another one: obstacles that come in have it",
-        )
+        expected = "another one: obstacles that come in have it"
+        _require(entry.name not in slots, f"regions[{i}].name", repr(entry.name), expected)
     far = Sphere(PARKED_POSITION, commands.obstacle_radius)
-    return tuple(
-        SecondaryRegion(
-            Region(name, far, "out", gain=commands.obstacle_gain), "obstacle", streamed=True, is_dynamic=True
-        )
-        for name in slots
-    )
+    regions = (Region(name, far, "out", gain=commands.obstacle_gain) for name in slots)
+    return tuple(SecondaryRegion(region, "obstacle", streamed=True, is_dynamic=True) for region in regions)
 
 
 def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_regions: int) -> LawSetup:
@@ -211,21 +205,15 @@ def check_mission(mission: Mission, law: LawSetup) -> None:
 
 def with_digests(file: File) -> File:
     """Return the file with the digests of all FMUs of the user's, which have to be those that it states."""
-    fill = msgspec.structs.replace
-    return fill(
-        file,
-        law=fill(file.law, digest=_check_digest("law", file.law)),
-        plant=fill(file.plant, digest=_check_digest("plant", file.plant)),
-        components=tuple(
-            fill(entry, digest=_check_digest(f"components.{entry.name}", entry)) for entry in file.components
-        ),
-    )
+    components = tuple(_with_digest(f"components.{entry.name}", entry) for entry in file.components)
+    law, plant = _with_digest("law", file.law), _with_digest("plant", file.plant)
+    return msgspec.structs.replace(file, law=law, plant=plant, components=components)
 
 
-def _check_digest(path: str, entry: FmuTable) -> str:
-    """Return the digest of an FMU, which has to be the one that its table states; "" without an FMU."""
+def _with_digest(path: str, entry: _Fmu) -> _Fmu:
+    """Return the table of an FMU with its digest, which has to be the one that it states; itself without an FMU."""
     if not entry.file:
-        return ""
+        return entry
     try:
         fmu = Path(entry.file)
         if not fmu.is_file():
@@ -236,7 +224,7 @@ def _check_digest(path: str, entry: FmuTable) -> str:
         raise ScenarioError(f"{path}.file: {entry.file}: {error.strerror or error}") from error
     if entry.digest not in ("", digest):
         raise ScenarioError(f"{path}.file: {fmu.name} has the digest {digest[:12]}..., expected {entry.digest[:12]}...")
-    return digest
+    return msgspec.structs.replace(entry, digest=digest)
 
 
 def check_components(entries: tuple[ComponentEntry, ...], fmi: int) -> tuple[UserFmu, ...]:

@@ -21,13 +21,8 @@ _WARN = 1.0  # value of FS_PILOT_INPUT
 _BLUEROV2_HEAVY, _UUV = 60002.0, 60000.0  # PX4's SYS_AUTOSTART
 _JOYSTICK_ALONE = 1.0  # value of COM_RC_IN_MODE
 _STICKS_LAST = 3.0  # s
-_ON_LOSS: dict[LossAction, float] = {
-    "none": 0.0,
-    "warn": 0.0,
-    "hold": 1.0,
-    "surface": 3.0,
-    "disarm": 6.0,
-}  # NAV_DLL_ACT
+# NAV_DLL_ACT
+_ON_LOSS: dict[LossAction, float] = {"none": 0.0, "warn": 0.0, "hold": 1.0, "surface": 3.0, "disarm": 6.0}
 # there is neither magnetometer nor battery, these failures are not detected, and home is at the surface
 _ARDUSUB_ZEROS = (
     *(f"COMPASS_DEV_ID{i}" for i in ("", 2, 3)), *(f"COMPASS_OFS{i}_{axis}" for i in ("", 2, 3) for axis in "XYZ"),

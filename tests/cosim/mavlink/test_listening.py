@@ -8,7 +8,6 @@ import select
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
@@ -230,19 +229,6 @@ def test_invalid_endpoint_or_no_vehicle_is_an_error(arguments, status, text, cap
     assert main(["mavlink", "listen", *arguments]) == status
     out, error = capsys.readouterr()
     assert text in (error if status == 2 else out) and error.count("\n") == (status == 2)
-
-
-@pytest.mark.slow
-def test_listen_command_prints_the_display():
-    port = free_port()
-    send, command = vehicle(port), [sys.executable, "-m", "cosim", "mavlink", "listen", f"udpin:{HERE}:{port}"]
-    with subprocess.Popen([*command, "--count", "3"], stdout=subprocess.PIPE) as process:
-        while process.poll() is None:
-            send(heartbeat())
-            time.sleep(0.05)
-        text = process.stdout.read().decode()
-    assert process.returncode == 0
-    assert "3 messages" in text and "PX4 SUBMARINE" in text and "\x1b" not in text
 
 
 @pytest.mark.slow
