@@ -80,6 +80,11 @@ class LoadedFmu:
         """Set an input of an FMU in initialization mode."""
         self._watched(lambda: self.plant.set({name: value}))
 
+    def get(self, name: str) -> float:
+        """Return the present value of a variable."""
+        value: float = self._watched(lambda: self.plant[name])
+        return value
+
     def step(self, now: float) -> None:
         """Send the inputs, make a step from `now` [s], and get the outputs, from Python."""
         self.progress[NOW] = now

@@ -64,7 +64,7 @@ class SteppedSystem:
         self._read()
 
     def _sent(self, line: Line) -> float:
-        return _changed(line, self._fmus[line.start[0]].plant[line.start[1]])
+        return _changed(line, self._fmus[line.start[0]].get(line.start[1]))
 
     def _column(self, port: Port) -> Column:
         v = self._files[port[0]].model[port[1]]
@@ -99,7 +99,7 @@ class SteppedSystem:
             self.row[first : first + len(values)] = values
             first += len(values)
         for name, variable in self._others:
-            self.row[self._index[name, variable]] = self._fmus[name].plant[variable]
+            self.row[self._index[name, variable]] = self._fmus[name].get(variable)
         if not np.isfinite(self.row[self._connected]).all():
             odd = next(i for i in self._connected if not np.isfinite(self.row[i]))
             name, variable = list(self._index)[odd - 1]

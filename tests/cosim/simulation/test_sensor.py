@@ -102,8 +102,9 @@ def test_the_law_is_built_for_the_vehicle(spy):
     assert not same(spy()[0].built[-1], spy("vehicle=bluerov2_heavy")[0].built[-1])
 
 
-def test_failed_thruster_gives_zero_after_its_failure_time():
-    kept = run("failures=[{thruster=3,time=1.0}]")
+@pytest.mark.parametrize("time", [1.0, 0.995])
+def test_failed_thruster_gives_zero_from_the_next_step_on(time):
+    kept = run(f"failures=[{{thruster=3,time={time}}}]")
     given, asked = kept["thruster_force[3]"][:-1], kept["thrust[3]"][:-1]
     assert np.abs(given[:100]).min() > 0.0
     assert not given[100:].any()
@@ -123,12 +124,6 @@ def test_reported_failure_reaches_law_and_allocation(spy):
     assert uncut.size > 0
     acting, asked = (stack(kept, *(f"{what}.{a}" for a in "XYZKMN")) for what in ("actuation", "command"))
     assert acting[uncut] == pytest.approx(asked[uncut], abs=1e-9)
-
-
-def test_a_failure_between_steps_counts_from_the_next_one():
-    kept = run("failures=[{thruster=3,time=0.995}]")
-    assert kept["thruster_force[3]"][99] != 0.0
-    assert not kept["thruster_force[3]"][100:-1].any()
 
 
 def test_noise_is_white_of_the_stated_size_and_held_for_a_control_period():
