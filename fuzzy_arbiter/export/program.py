@@ -11,12 +11,13 @@ from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines import choose as choose_engine
 from fuzzy_arbiter.engines.clipped_centroid import Centroid, Outline, outline
-from fuzzy_arbiter.engines.clipped_curves import ClippedCurves, with_crossings
+from fuzzy_arbiter.engines.clipped_curves import ClippedCurves
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.engine import Engine
 from fuzzy_arbiter.engines.firing import Logic, Slot
 from fuzzy_arbiter.engines.panels import halved, smooth_panels
 from fuzzy_arbiter.engines.quadrature import Quadrature
+from fuzzy_arbiter.engines.term_lines import with_crossings
 from fuzzy_arbiter.errors import DefinitionError, UnsupportedError
 from fuzzy_arbiter.export.code_functions import called
 from fuzzy_arbiter.export.statements import JOINS, Cases, Expressions, assign, assign_first, choose, degree_of
