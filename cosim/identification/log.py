@@ -32,6 +32,11 @@ _MIN_SAMPLES = 20  # number of samples of a topic, and of commands
 _DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # fourth difference: its variance is 70 times that of white noise
 _MAD = 1.4826  # standard deviation of a normal distribution, in median absolute deviations
 
+_HALF_TURNS = np.zeros((4, 3, 4))  # derivative of `half_turns` by the quaternion
+_HALF_TURNS[[1, 0, 3, 2, 2, 3, 0, 1, 3, 2, 1, 0], [0] * 4 + [1] * 4 + [2] * 4, [0, 1, 2, 3] * 3] = (
+    -1, 1, 1, -1, -1, -1, 1, 1, -1, 1, -1, 1,
+)  # fmt: skip
+_HALF_TURNS = _HALF_TURNS.reshape(4, 12)
 _SAMPLED = ("pulses", "effort")  # quantities of commands that an autopilot logs slower than it changes them
 _MEANS = ("VISO", "VISION_POSITION_DELTA")  # DVL messages with the displacement since the last message
 
@@ -173,9 +178,8 @@ def measured_turns(log: Log, times: Array) -> Array:
 def half_turns(quaternions: Array) -> Array:
     """Return matrices (..., 3, 4) from r to the vector part of conj(q) r; their rows are q times the unit vectors."""
     # Twice that vector part is the rotation from q to r [rad, body frame], if it is small.
-    e0, e1, e2, e3 = np.moveaxis(quaternions, -1, 0)
-    rows = ((-e1, e0, e3, -e2), (-e2, -e3, e0, e1), (-e3, e2, -e1, e0))
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    result: Array = (quaternions @ _HALF_TURNS).reshape(*quaternions.shape[:-1], 3, 4)
+    return result
 
 
 def _with_mean(topic: Topic, facts: Sequence[TopicFacts]) -> Topic:

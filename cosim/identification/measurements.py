@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,12 @@ class Errors:
     bias: Array  # (3,) rad/s, body frame, bias of the gyro
 
 
+    @functools.cached_property
+    def turning(self) -> Array:
+        """Matrix (3, 3) by which rows of angular velocity [rad/s] give the DVL's velocity about the origin [m/s]."""
+        return np.cross(np.eye(3), self.lever)
+
+
 NO_ERRORS = Errors(np.zeros(3), 0.0, np.zeros(3))
 
 
@@ -31,7 +38,7 @@ def residual(topic: Topic, states: Array, errors: Errors) -> Array:
         error = 2.0 * _sign(topic, states) * np.einsum("nij,nj->ni", half_turns(topic.values), prediction)
     else:
         if topic.name == "velocity":
-            prediction = (1.0 + errors.scale) * (prediction + np.cross(states[:, _ANGULAR], errors.lever))
+            prediction = (1.0 + errors.scale) * (prediction + states[:, _ANGULAR] @ errors.turning)
         elif topic.name == "angular_velocity":
             prediction = prediction + errors.bias
         error = prediction - topic.values
@@ -43,7 +50,7 @@ def derivative(topic: Topic, states: Array, tangents: Array, errors: Errors) -> 
     """Return the derivatives of the residual along d directions, shape (n, c, d)."""
     change = tangents[:, :, STATES[topic.name]]
     if topic.name == "velocity":
-        change = (1.0 + errors.scale) * (change + np.cross(tangents[:, :, _ANGULAR], errors.lever))
+        change = (1.0 + errors.scale) * (change + tangents[:, :, _ANGULAR] @ errors.turning)
     elif topic.name == "attitude":
         turn = np.einsum("nij,ndj->ndi", half_turns(topic.values), change)
         change = 2.0 * _sign(topic, states)[:, :, None] * turn
@@ -55,9 +62,9 @@ def derivative_by_errors(topic: Topic, states: Array, errors: Errors, kind: str,
     """Return the derivative of the residual by one constant error, shape (n, c); None if it does not depend on it."""
     unit = np.eye(3)[axis]
     if topic.name == "velocity" and kind == "lever":
-        change = (1.0 + errors.scale) * np.cross(states[:, _ANGULAR], unit)
+        change = (1.0 + errors.scale) * states[:, _ANGULAR] @ np.cross(np.eye(3), unit)
     elif topic.name == "velocity" and kind == "scale":
-        change = states[:, _LINEAR] + np.cross(states[:, _ANGULAR], errors.lever)
+        change = states[:, _LINEAR] + states[:, _ANGULAR] @ errors.turning
     elif topic.name == "angular_velocity" and kind == "bias":
         change = np.broadcast_to(unit, (len(states), 3))
     else:

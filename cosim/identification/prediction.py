@@ -54,28 +54,30 @@ class Prediction:
 
 def validate(
     logs: Sequence[Log], vehicle: Vehicle, parameters: Sequence[Parameter], values: Array, step: float,
-    horizons: Sequence[float] = HORIZONS, modes: Sequence[bool] = (False, True),
+    horizons: Sequence[float] = HORIZONS, modes: Sequence[bool] = (False, True), compare: bool = True,
 ) -> list[Prediction]:  # fmt: skip
     """Predict windows of runs from their sampled start states alone, and compare with the samples; step [s]."""
     # `modes`: with attitude and angular velocity predicted (False), and with those that were measured as inputs (True).
+    # `compare`: the errors of the start vehicle and of a constant velocity too.
     starts = np.array([p.start if not p.is_nuisance else x for p, x in zip(parameters, values, strict=True)])
     logs = [move_back(log, _delays(parameters, values)) for log in logs]
     predictions = []
     for horizon, measured in itertools.product(horizons, modes):
         windows, _ = cut_windows(logs, vehicle, step, horizon)
         problem = Residuals(logs, vehicle, parameters, windows, step, turns_measured=measured)
-        settings = [problem.settings(x) for x in (values, starts)]
+        settings = [problem.settings(x) for x in ((values, starts) if compare else (values,))]
         rows: dict[str, list[tuple[int, Array, tuple[Array, ...]]]] = {}
         for i, window in enumerate(problem.windows):
             try:
-                both = [window.by_topic(problem.raw(i, setting, window.start, full=False)[0]) for setting in settings]
+                predicted = [problem.errors(i, setting) for setting in settings]
             except IdentificationError:
                 continue  # one of the two predictions does not stay finite
             for topic in window.topics:
-                constant_velocity = residual(topic, _constant_velocity(window.start, topic.times), NO_ERRORS)
-                errors = (both[0][topic.name], both[1][topic.name], constant_velocity)
-                entry = window.run, topic.values, tuple(r * topic.noise for r in errors)
-                rows.setdefault(topic.name, []).append(entry)
+                errors = [x[topic.name] for x in predicted]
+                if compare:
+                    states = _constant_velocity(window.start, topic.times)
+                    errors.append(residual(topic, states, NO_ERRORS) * topic.noise)
+                rows.setdefault(topic.name, []).append((window.run, topic.values, tuple(errors)))
         names = [name for name in TOPICS if name in rows]
         predictions += [_summarize(name, horizon, measured, rows[name], len(logs)) for name in names]
     return predictions
@@ -92,7 +94,7 @@ def predicted_samples(log: Log, fit: Fit, vehicle: Vehicle, horizon: float) -> t
     for i, window in enumerate(problem.windows if log.topic("velocity") else ()):
         topic = next(t for t in window.topics if t.name == "velocity")
         try:
-            error = window.by_topic(problem.raw(i, settings, window.start, full=False)[0])["velocity"] * topic.noise
+            error = problem.errors(i, settings)["velocity"]
         except IdentificationError:
             continue  # the prediction does not stay finite
         parts.append((topic.times + window.begin, topic.values, topic.values + error))
@@ -118,7 +120,8 @@ def _summarize(
     squares = [np.sum(np.square(errors[0][of_run == run]), axis=0) * len(of_run) for run in range(runs)]
     counts = np.bincount(of_run, minlength=runs)
     scores = [np.mean(1.0 - s / (n * spread)) if n else np.nan for s, n in zip(squares, counts, strict=True)]
-    identified, start, constant = (np.sqrt(np.mean(np.square(e), axis=0)) for e in errors)
+    identified, *others = (np.sqrt(np.mean(np.square(e), axis=0)) for e in errors)
+    start, constant = others or (np.full_like(identified, np.nan),) * 2
     return Prediction(name, horizon, measured, len(rows), identified, start, constant, r2, np.array(scores))
 
 
@@ -261,7 +264,8 @@ def _scores(folds: Sequence[_Fold], vehicle: Vehicle, free: set[str], zero: set[
     for fold in folds:
         values = fold.step_to([*free], [*zero])
         predictions = validate(
-            fold.test, vehicle, *with_mean_nuisances(fold.parameters, values), fold.step, _HORIZONS, (True,)
+            fold.test, vehicle, *with_mean_nuisances(fold.parameters, values), fold.step, _HORIZONS, (True,),
+            compare=False,
         )
         by_horizon = [p.scores for p in predictions if p.topic in ("velocity", "position")]
         scores[[*fold.runs]] = np.mean(by_horizon, axis=0) if by_horizon else -np.inf

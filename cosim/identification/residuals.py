@@ -18,7 +18,7 @@ from cosim.identification.actuation import CommandedForces, error_wrenches
 from cosim.identification.command_errors import Whitener, most_likely_errors, whitener
 from cosim.identification.log import Log, Topic, half_turns, measured_turns
 from cosim.identification.parameters import Parameter, Setting, setting_of
-from cosim.identification.shooting import STATE_SIZE, Directions, Motion, Shooter
+from cosim.identification.shooting import NO_DIRECTIONS, STATE_SIZE, Directions, Motion, Shooter
 from cosim.identification.windows import Window
 from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
@@ -120,6 +120,14 @@ class Residuals:
             whiten(per_noise[:, None] * np.concatenate(rows)),
         )
 
+    def errors(self, i: int, settings: Sequence[Setting]) -> dict[str, Array]:
+        """Return prediction less sample of each topic of a window from its sampled start, in the topic's unit."""
+        setting = settings[self.windows[i].run]
+        return {
+            topic.name: measurements.residual(topic, sampled.states, setting.errors) * topic.noise
+            for topic, sampled, _ in self._sampled(i, setting, self.windows[i].start, NO_DIRECTIONS)
+        }
+
     def _sampled(
         self, i: int, setting: Setting, start: Array, directions: Directions
     ) -> Iterator[tuple[Topic, Motion, Array]]:
@@ -179,7 +187,8 @@ class Residuals:
 
     def _per_noise(self, window: Window) -> Array:
         """Return the factor of each row by which the noise of its topic is less than that of its samples."""
-        return np.array([1.0 / self._noise_parts.get(name, 1.0) for name in window.topic_names])
+        parts = [1.0 / self._noise_parts.get(topic.name, 1.0) for topic in window.topics]
+        return np.repeat(parts, [len(topic.times) * len(topic.components) for topic in window.topics])
 
     def _by_impulse(self, i: int, settings: Sequence[Setting], start: Array) -> Array:
         """Return the residuals of a window by the impulses that sampled commands leave open."""
