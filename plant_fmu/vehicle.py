@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import msgspec
 import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
@@ -25,6 +27,7 @@ Fraction = Annotated[float, Meta(ge=0.0, le=1.0)]
 Vector3 = tuple[Number, Number, Number]
 Wrench = tuple[Number, Number, Number, Number, Number, Number]  # X Y Z K M N
 Damping = tuple[Amount, Amount, Amount, Amount, Amount, Amount]  # of u v w p q r (Property 3)
+Sensor = Literal["depth_sensor", "dvl", "imu", "compass", "usbl"]
 Rows = tuple[tuple[Number, ...], ...]
 Matrix = tuple[Number | tuple[Number, ...], ...]  # rows, or a diagonal
 
@@ -55,6 +58,8 @@ _KEYS = {
     "thrust_rate_limit": "thrusters.rate_limit",
     "thrust_dead_band": "thrusters.dead_band",
     "thrust_curve": "thrusters.curve",
+    "command_delay": "thrusters.delay",
+    "dvl_position": "sensors.dvl_position",
     "hull_radius": "hull.radius",
 }
 _ORDERS = {"inertia": 3, "added_mass": 6}  # symmetric matrices
@@ -100,9 +105,19 @@ class Thrusters(Table, frozen=True):
     force_min: Number | tuple[Number, ...]  # N, most negative force
     force_max: Number | tuple[Number, ...]  # N, maximum force
     time_constant: Amount | tuple[Amount, ...] = 0.0  # s, time constant of the lag
+    delay: Annotated[float, Meta(ge=0.0, le=10.0)] = 0.0  # s, before the lag; also of a commanded wrench
     rate_limit: Amount | tuple[Amount, ...] = 0.0  # N/s, maximum rate of the force; 0: none
     dead_band: Fraction | tuple[Fraction, ...] = 0.0  # fraction of the command's range that gives no force
     curve: Fraction | tuple[Fraction, ...] = 0.0  # 0: force linear in the command; 1: quadratic; between: a mixture
+
+
+class Sensors(Table, frozen=True):
+    """Where and how late sensors measure."""
+
+    dvl_position: Vector3 = (0.0,) * 3  # m, body frame
+    delay: dict[Sensor, Annotated[float, Meta(ge=0.0, le=10.0)]] = msgspec.field(
+        default_factory=dict
+    )  # s, from a sample to its delivery
 
 
 class Hull(Table, frozen=True):
@@ -128,6 +143,7 @@ class _File(Table, frozen=True):
     hydrostatics: Hydrostatics
     hydrodynamics: Hydrodynamics
     thrusters: Thrusters
+    sensors: Sensors = Sensors()
     hull: Hull = Hull()
     autopilot: Autopilot | None = None
 
@@ -164,9 +180,12 @@ class Vehicle:
     thrust_rate_limit: NDArray[np.float64]  # (n,) N/s, maximum rate of the force; 0 for none
     thrust_dead_band: NDArray[np.float64]  # (n,) [-] fraction of the command's range that gives no force
     thrust_curve: NDArray[np.float64]  # (n,) [-] 0: force linear in the command; 1: quadratic
+    command_delay: float  # s, from a command to the begin of its force; runs have it, the FMU has not
+    dvl_position: NDArray[np.float64]  # (3,) m, body frame
     hull_radius: float  # m, radius of the sphere that meets surface and bottom
     autopilot: Autopilot | None = None  # map from servo outputs to thrusters; a channel and a sign for each
     hull_shape: Literal["frame", "sphere"] = "frame"  # shape in pictures
+    sensor_delay: Mapping[str, float] = field(default_factory=dict)  # s, of sensors with another one than usual
 
     @property
     def n_thrusters(self) -> int:
@@ -287,9 +306,9 @@ def _folder() -> resources.abc.Traversable:
 def _make_vehicle(file: _File) -> Vehicle:
     """Convert the file's numbers to arrays, and refuse those that contradict each other."""
     source = " ".join(file.source.split())
-    for field, text in (("title", file.title), ("source", source)):
+    for entry, text in (("title", file.title), ("source", source)):
         unprintable = next((c for c in text if not c.isprintable()), "")
-        require(not unprintable, field, f"text with {unprintable!r}", "printable characters")
+        require(not unprintable, entry, f"text with {unprintable!r}", "printable characters")
     matrix = file.thrusters.matrix
     widths = {len(row) for row in matrix}
     require(
@@ -299,9 +318,9 @@ def _make_vehicle(file: _File) -> Vehicle:
     )  # fmt: skip
     (n,) = widths
 
-    arrays = {field: _array(file, field, n) for field in _KEYS}
+    arrays = {name: _array(file, name, n) for name in _KEYS}
     vehicle = Vehicle(
-        name=file.name, title=file.title, source=source, hull_shape=file.hull.shape,
+        name=file.name, title=file.title, source=source, hull_shape=file.hull.shape, sensor_delay=file.sensors.delay,
         autopilot=file.autopilot and file.autopilot.for_thrusters(n), **arrays,
     )  # fmt: skip
     above = bool((vehicle.thrust_min > vehicle.thrust_max).any())

@@ -32,14 +32,15 @@ from controller.navigation.navigation_memory import (
     NavigationMemory,
     set_first_covariance,
 )
-from controller.quaternion import rotation_matrix, skew
-from controller.stack_array import Matrix3, Vector3, array, zeros
+from controller.quaternion import multiply, rotation_matrix, skew
+from controller.stack_array import Matrix3, Vector3, Vector4, array, zeros
 
 _GATE = 4.0  # number of standard deviations of an innovation beyond which a sample is rejected
 _UNKNOWN = 10.0  # ratio of the velocity's deviation to a sample's above which the sample is nearer to the truth
 _REJECTED_IN_A_ROW = 3  # number of successive rejected samples that is rare where one in fifty is an outlier
 CONFIRMED = 3.0  # number of accepted samples after which a sample that contradicts them is an outlier
 _RESETS = 4.0  # number of resets of the covariance without a confirmed sample in between before the filter starts again
+_SHORT = 0.02  # s, over which the attitude's change gives the angular velocity of a late sample
 _STEEP = 0.1  # squared cosine of the pitch below which a compass is not used
 _HALF_TURN, _TURN = 3.141592653589793, 6.283185307179586  # rad
 _LEAST_SCALE = 1e-3  # least noise of a sensor, in its unit, which keeps the covariance positive
@@ -54,7 +55,7 @@ def correct_by_sensor(memory: NavigationMemory, measurements: Measurements, sens
         memory.innovations[sensor, 2] += 1.0
         return
     R = rotation_matrix(quaternion)
-    noise = _predict_sample(memory, measurements, sensor, sensors, position, velocity, R, innovation, rows)
+    noise = _predict_sample(memory, measurements, sensor, sensors, position, velocity, quaternion, R, innovation, rows)
     if noise < 0.0:
         return
     age = memory.time - measurements.times[sensor]
@@ -88,6 +89,7 @@ def _predict_sample(
     sensors: SensorModel,
     position: Vector3,
     velocity: Vector3,
+    quaternion: Vector4,
     R: Matrix3,
     innovation: Vector3,
     rows: ErrorRows,
@@ -108,9 +110,10 @@ def _predict_sample(
         sample = values[MEASURED_VELOCITY : MEASURED_VELOCITY + 3]
         P, noise = memory.covariance, max(sensors.velocity, _LEAST_SCALE)
         unknown = max(P[VELOCITY, VELOCITY], P[VELOCITY + 1, VELOCITY + 1], P[VELOCITY + 2, VELOCITY + 2])
+        about = cross(_turn_rate(memory, measurements.times[DVL], quaternion), sensors.dvl_position)
         # an error of attitude acts on the true velocity, to which the sample is nearer
-        world_velocity = R @ sample / scale if unknown > square(_UNKNOWN * noise) else velocity
-        innovation[:] = sample - scale * (R.T @ velocity)
+        world_velocity = R @ (sample - scale * about) / scale if unknown > square(_UNKNOWN * noise) else velocity
+        innovation[:] = sample - scale * (R.T @ velocity + about)
         rows[:, VELOCITY : VELOCITY + 3] = scale * R.T
         rows[:, ATTITUDE : ATTITUDE + 3] = scale * (R.T @ skew(world_velocity))
         rows[:, VELOCITY_SCALE] = R.T @ world_velocity
@@ -128,6 +131,15 @@ def _predict_sample(
     rows[0, ATTITUDE + 1] = -R[2, 0] * R[1, 0] / level
     rows[0, ATTITUDE + 2] = rows[0, HEADING_BIAS] = 1.0
     return max(sensors.heading, _LEAST_SCALE)
+
+
+def _turn_rate(memory: NavigationMemory, time: float, quaternion: Vector4) -> Vector3:
+    """Return the angular velocity [rad/s] at a time [s] and the attitude there, by its change from shortly before."""
+    before = zeros(4)
+    if time >= memory.time or not estimate_at(memory, time - _SHORT, zeros(3), zeros(3), before):
+        return memory.omega.copy()
+    change = multiply(array(before[0], -before[1], -before[2], -before[3]), quaternion)
+    return (2.0 / _SHORT) * change[1:]
 
 
 def _age_row(row: Errors, age: float, acceleration: Vector3, R: Matrix3, gravity: float) -> None:

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.stack_array import Vector3
+
 Array = NDArray[np.float64]
 
 DEPTH_SENSOR, DVL, IMU, COMPASS, USBL, N_SENSORS = 0, 1, 2, 3, 4, 5  # indices in `Measurements.times`
@@ -46,6 +48,7 @@ class SensorModel(NamedTuple):
     angular_velocity_bias: float = 0.0017  # rad/s
     heading_bias: float = 0.0175  # rad
     gravity: float = 9.81  # m/s2
+    dvl_position: Vector3 = np.zeros(3)  # m, body frame
 
 
 def empty_measurements() -> Measurements:

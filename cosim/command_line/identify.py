@@ -29,11 +29,11 @@ def add_verbs(verbs: Any) -> None:
     flag(
         verb, "--free KEY", "keys of the vehicle's file, such as hydrodynamics.added_mass or "
         "hydrodynamics.added_mass.2.6 (default: added mass, damping, buoyancy and its center, the thrusters' time "
-        "constant)", nargs="+",
+        "constant, the DVL's position)", nargs="+",
     )  # fmt: skip
     flag(
-        verb, "--nuisance NAME", "nuisance parameters: current, force, delay, lever, bias, scale, asymmetry, phase, "
-        "random_force (default: current, lever, bias, scale and phase); or auto: those that predict best what "
+        verb, "--nuisance NAME", "nuisance parameters: current, force, delay, bias, scale, asymmetry, phase, "
+        "random_force (default: current, bias, scale and phase); or auto: those that predict best what "
         "was not fitted, with measured attitude", nargs="*",
     )  # fmt: skip
     flag(verb, "--measured-attitude", "take attitude and turn rates as inputs, and identify translation alone")

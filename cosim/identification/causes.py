@@ -30,7 +30,7 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
     kinds = {p.kind for p in parameters}
     groups = {f"--nuisance {name}": nuisances((name,), logs) for name in NUISANCES if name not in kinds}
     free_keys = {".".join(p.name.split(".")[:2]) for p in parameters}
-    for key in ("thrusters.matrix", "thrusters.time_constant", "hydrostatics.trim"):
+    for key in ("thrusters.matrix", "thrusters.time_constant", "hydrostatics.trim", "sensors.dvl_position"):
         if key not in free_keys:
             groups[f"--free {key}"] = free_parameters(vehicle, (key,))
     every = [*parameters, *(p for group in groups.values() for p in group)]

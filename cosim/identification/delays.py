@@ -51,6 +51,11 @@ def find_delays(logs: Sequence[Log], vehicle: Vehicle, step: float) -> dict[str,
     return {name: delays.get(name, min(delays.values())) for name in present}
 
 
+def usual_delays(vehicle: Vehicle) -> dict[str, float]:
+    """Return the delay [s] of each topic by the vehicle's file."""
+    return dict.fromkeys(TOPICS, vehicle.command_delay)
+
+
 def move_back(log: Log, delays: dict[str, float]) -> Log:
     """Return a log whose sample times are corrected by the delays; delays [s]."""
     return replace(log, topics=tuple(

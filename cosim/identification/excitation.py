@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
+from cosim.identification.delays import move_back, usual_delays
 from cosim.identification.fit import STAGES, single_thread
 from cosim.identification.log import STATES, Log, make_topic
 from cosim.identification.parameters import DEFAULT_FREE, DEFAULT_NUISANCES, Parameter, free_parameters, nuisances
@@ -361,6 +362,7 @@ def excursions_of(rehearsal: Rehearsal, scenario: Scenario, box: Box, count: int
 
 def information(log: Log, vehicle: Vehicle, parameters: Sequence[Parameter]) -> Array | None:
     """Return the information of a run on the free parameters, shape (p, p), without prior; None without windows."""
+    log = move_back(log, usual_delays(vehicle))
     windows, _ = cut_windows([log], vehicle, ROW, STAGES[0])
     if not windows:
         return None

@@ -31,6 +31,8 @@ _NEEDS = {  # motion that determines the numbers of a key
     "hydrostatics.center_of_buoyancy": "roll and pitch of 20 degrees or more, to both sides, held for some seconds",
     "rigid_body.center_of_gravity": "roll and pitch of 20 degrees or more, to both sides, held for some seconds",
     "thrusters.time_constant": "steps of thrust, with angular velocities at 20 Hz or more",
+    "thrusters.delay": "steps of thrust, with velocities at 5 Hz or more",
+    "sensors.dvl_position": "quick turns about all axes",
     "thrusters.matrix": "a force that is known: a bollard pull of each thruster",
 }  # fmt: skip
 
@@ -47,12 +49,12 @@ def verdict(fit: Fit) -> str:
 
 
 def shared_nuisances(fit: Fit) -> Iterator[str]:
-    """Yield a sentence with the nuisances that all runs share, for which a vehicle's file has no keys."""
+    """Yield a sentence with the nuisances that all runs share."""
     numbers = zip(fit.parameters, fit.values, fit.intervals.half, strict=True)
     shared = [f"{p.name} {x:.3g} ± {half:.2g} {p.unit}".rstrip() for p, x, half in numbers
               if p.is_nuisance and p.run is None and p.kind != "phase"]  # fmt: skip
     if shared:
-        yield f"Also estimated, but not in this file: {'; '.join(shared)}."
+        yield f"Also estimated: {'; '.join(shared)}."
 
 
 def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
@@ -179,7 +181,8 @@ _CAUSES = {
     "delay": "late samples", "scale": "the DVL's scale", "force": "a constant force, as of a tether",
     "asymmetry": "thrusters that are weaker backward", "thrusters.matrix": "unequal thrusters",
     "hydrostatics.trim": "a constant force on the body, as of a mounted tether",
-    "thrusters.time_constant": "a lag of the thrusters", "current": "a current", "lever": "the DVL's lever arm",
+    "thrusters.time_constant": "a lag of the thrusters", "current": "a current",
+    "sensors.dvl_position": "the DVL's lever arm",
     "bias": "biases of the gyro", "phase": "commands that change early or late between samples",
     "random_force": "a force that changes in time, such as of waves or a tether",
 }  # fmt: skip
@@ -194,7 +197,7 @@ def require_distinguishable(fit: Fit) -> None:
             raise IdentificationError(
                 f"{fit.parameters[lag].name} and the {fit.parameters[delay].name} are not separated by these runs "
                 f"(correlation {size:.2f}), expected one of the two: --free without the time constant, or "
-                "--nuisance without delay"
+                "none of a delay"
             )
 
 

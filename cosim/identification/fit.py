@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from cosim.errors import IdentificationError
 from cosim.identification.causes import Cause, find_causes
-from cosim.identification.delays import delay_of, find_delays, move_back, within_margins
+from cosim.identification.delays import delay_of, find_delays, move_back, usual_delays, within_margins
 from cosim.identification.intervals import DISAGREES, MAX_PRIOR_FRACTION, Intervals, estimate_intervals
 from cosim.identification.log import Log, command_spans
 from cosim.identification.parameters import Parameter
@@ -115,6 +115,8 @@ def fit(
         parameters = [within_margins(p, delays) for p in parameters]
         is_delay = np.array([p.kind == "delay" for p in parameters])
         values = np.where(is_delay, [delay_of(p, delays) for p in parameters], values)
+    elif vehicle.command_delay:
+        logs = [move_back(log, usual_delays(vehicle)) for log in logs]
     stages = tuple(zip(STAGES, _ROUNDS, strict=True))
     if (
         turns_measured or random_force or any(log.sampled for log in logs)

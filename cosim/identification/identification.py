@@ -67,7 +67,9 @@ def identify(
         parameters = free_parameters(vehicle, free or (TRANSLATION_FREE if turns_measured else DEFAULT_FREE))
         if free is not None and not free:
             raise IdentificationError("--free: nothing is free, expected at least one key")
-        parameters += nuisances(nuisance, logs, common_delay=turns_measured)
+        parameters += nuisances(nuisance, logs)
+        if len({p.is_nuisance for p in parameters if p.kind == "delay"}) > 1:
+            raise IdentificationError("--nuisance delay: contains thrusters.delay, which is free, expected one of them")
     try:
         fitted = fit(logs, vehicle, parameters, progress, RANDOM_FORCE in nuisance, turns_measured, delays)
     except IdentificationError as error:

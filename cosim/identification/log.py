@@ -20,6 +20,7 @@ from plant_fmu.vehicle import Vehicle
 TOPICS = ("velocity", "angular_velocity", "depth", "attitude", "position")
 UNITS = {"velocity": "m/s", "angular_velocity": "rad/s", "depth": "m", "attitude": "rad", "position": "m"}
 AXES = {"velocity": "uvw", "angular_velocity": "pqr", "depth": "z", "attitude": "xyz", "position": "xyz"}
+SENSORS_OF = dict(zip(TOPICS, ("dvl", "imu", "depth_sensor", "compass", "usbl"), strict=True))
 # elements of a motion's state that a topic measures: position, quaternion, velocity [m/s, rad/s]
 STATES = {
     "velocity": slice(7, 10), "angular_velocity": slice(10, 13), "depth": slice(2, 3), "attitude": slice(3, 7),

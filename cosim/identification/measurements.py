@@ -21,7 +21,6 @@ class Errors:
     scale: float  # relative error of the DVL's velocity [-]; positive: it measures too much
     bias: Array  # (3,) rad/s, body frame, bias of the gyro
 
-
     @functools.cached_property
     def turning(self) -> Array:
         """Matrix (3, 3) by which rows of angular velocity [rad/s] give the DVL's velocity about the origin [m/s]."""

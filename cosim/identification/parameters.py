@@ -12,7 +12,7 @@ import numpy as np
 
 from cosim.errors import IdentificationError
 from cosim.identification.actuation import CHANGES, Actuation, CommandedForces
-from cosim.identification.log import TOPICS, Log
+from cosim.identification.log import SENSORS_OF, TOPICS, Log
 from cosim.identification.measurements import Errors
 from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
@@ -22,17 +22,17 @@ Kind = Literal["plant", "lag", "thrust", "current", "force", "delay", "lever", "
 # what is freed unless the user says otherwise: mass, weight, center of gravity and inertia are known better by scales
 DEFAULT_FREE = (
     "hydrodynamics.added_mass", "hydrodynamics.linear_damping", "hydrodynamics.quadratic_damping",
-    "hydrostatics.buoyancy", "hydrostatics.center_of_buoyancy", "thrusters.time_constant",
+    "hydrostatics.buoyancy", "hydrostatics.center_of_buoyancy", "thrusters.time_constant", "sensors.dvl_position",
 )  # fmt: skip
 # with attitude and angular velocity as inputs: what moves along the axes alone
 TRANSLATION_FREE = (
     *(f"hydrodynamics.added_mass.{i}.{i}" for i in (1, 2, 3)),
     *(f"hydrodynamics.{kind}_damping.{i}" for kind in ("linear", "quadratic") for i in (1, 2, 3)),
-    "hydrostatics.buoyancy",
+    "hydrostatics.buoyancy", "thrusters.delay",
 )  # fmt: skip
-NUISANCES: tuple[Kind, ...] = ("current", "force", "delay", "lever", "bias", "scale", "asymmetry", "phase")
+NUISANCES: tuple[Kind, ...] = ("current", "force", "delay", "bias", "scale", "asymmetry", "phase")
 RANDOM_FORCE = "random_force"  # a nuisance that is eliminated from each window, and no parameter
-DEFAULT_NUISANCES = ("current", "lever", "bias", "scale", "phase")
+DEFAULT_NUISANCES = ("current", "bias", "scale", "phase")
 
 _ELEMENT = re.compile(r"(?P<key>[a-z_]+\.[a-z_]+)(?:\.(?P<row>\d+)(?:\.(?P<column>\d+))?|\.(?P<part>diagonal))?")
 _COUPLING = 0.3  # standard deviation of an off-diagonal element, in geometric means of its diagonal elements
@@ -44,17 +44,19 @@ _INERTIA = 0.2  # relative deviation
 _CENTER = 0.03  # m
 _TRIM = (3.0, 0.5)  # N, N m
 _LAG, _MAX_LAG = 0.2, 2.0  # s
+_MIN_DELAY = 1e-3  # s, of a sensor behind the others; shorter ones are not written
+_DELAY, _LEVER = 0.1, 0.3  # s, m
 _THRUST = 0.1  # relative deviation of each thruster: 3.5 % of all eight together
 _KEYS = (
     "rigid_body.mass", "rigid_body.weight", "rigid_body.inertia", "rigid_body.center_of_gravity",
     "hydrostatics.buoyancy", "hydrostatics.center_of_buoyancy", "hydrostatics.trim", "hydrodynamics.added_mass",
-    "hydrodynamics.linear_damping", "hydrodynamics.quadratic_damping", "thrusters.time_constant", "thrusters.matrix",
+    "hydrodynamics.linear_damping", "hydrodynamics.quadratic_damping", "thrusters.time_constant", "thrusters.delay",
+    "thrusters.matrix", "sensors.dvl_position",
 )  # fmt: skip
 _NUISANCES: dict[str, tuple[str, str, float, str]] = {  # label, unit, deviation of the prior, axes
     "current": ("current", "m/s", 0.3, "xy"),
     "force": ("constant force", "N", 0.5, "xy"),
-    "delay": ("delay of", "s", 0.1, ""),
-    "lever": ("DVL lever", "m", 0.3, "xyz"),
+    "delay": ("delay of", "s", _DELAY, ""),
     "bias": ("gyro bias", "rad/s", 0.01, "pqr"),
     "scale": ("DVL scale error", "", 0.01, " "),
     "asymmetry": ("loss backward of thruster", "", 0.1, ""),
@@ -89,7 +91,7 @@ class Parameter:
     @property
     def is_nuisance(self) -> bool:
         """True for a nuisance, which is no number of the vehicle."""
-        return self.kind not in ("plant", "lag", "thrust")
+        return self.kind in NUISANCES and self.name != "thrusters.delay"
 
 
 def free_parameters(vehicle: Vehicle, keys: Sequence[str]) -> list[Parameter]:
@@ -108,15 +110,16 @@ def free_parameters(vehicle: Vehicle, keys: Sequence[str]) -> list[Parameter]:
     return list(parameters.values())
 
 
-def nuisances(names: Sequence[str], logs: Sequence[Log], common_delay: bool = False) -> list[Parameter]:
-    """Return the free parameters that are not of the vehicle; with `common_delay` one delay of all topics."""
-    if "trim" in names:
-        raise IdentificationError("--nuisance trim: is a vehicle's number, expected --free hydrostatics.trim")
+def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
+    """Return the free parameters that are not of the vehicle."""
+    for name, key in (("trim", "hydrostatics.trim"), ("lever", "sensors.dvl_position")):
+        if name in names:
+            raise IdentificationError(f"--nuisance {name}: is a vehicle's number, expected --free {key}")
     if unknown := [name for name in names if name not in (*NUISANCES, RANDOM_FORCE)]:
         expected = ", ".join((*NUISANCES, RANDOM_FORCE))
         raise IdentificationError(f"--nuisance {unknown[0]}: is unknown, expected some of {expected}")
     components = {
-        "delay": [""] if common_delay else [name for name in TOPICS if any(log.topic(name) for log in logs)],
+        "delay": [name for name in TOPICS if any(log.topic(name) for log in logs)],
         "asymmetry": [f"{i + 1}" for i in range(logs[0].thrust.shape[1])],
         "phase": list(CHANGES),
     }
@@ -130,7 +133,7 @@ def nuisances(names: Sequence[str], logs: Sequence[Log], common_delay: bool = Fa
                 if name == "phase":
                     unit, deviation = _CHANGE_PRIORS[axis.split(" ")[0]]
                 plant = f"current.{axis}" if name == "current" else axis if name == "delay" else ""
-                full_name = f"{label} {axis or 'all samples'}".strip() + suffix
+                full_name = f"{label} {axis}".strip() + suffix
                 parameters.append(Parameter(full_name, unit, name, 0.0, deviation, plant=plant, index=index, run=run))
     return parameters
 
@@ -139,20 +142,32 @@ def with_values(vehicle: Vehicle, parameters: Sequence[Parameter], values: Array
     """Return a vehicle with identified values; values (p,)."""
     changed: dict[str, Any] = {name: np.array(getattr(vehicle, name)) for name in (
         "added_mass", "linear_damping", "quadratic_damping", "r_B", "r_G", "inertia", "thruster_matrix",
-        "thrust_time_constant", "mass", "weight", "buoyancy", "trim",
+        "thrust_time_constant", "mass", "weight", "buoyancy", "trim", "dvl_position", "command_delay",
     )}  # fmt: skip
+    late = {
+        SENSORS_OF[p.plant]: float(x) for p, x in zip(parameters, values, strict=True) if p.kind == "delay" and p.plant
+    }
     for p, value in zip(parameters, values, strict=True):
         if p.kind == "lag":
             changed["thrust_time_constant"][:] = value
         elif p.kind == "thrust":
             changed["thruster_matrix"][:, p.index] = vehicle.thruster_matrix[:, p.index] * value
+        elif p.kind == "lever":
+            changed["dvl_position"][p.index] = value
+        elif p.kind == "delay" and not p.plant:
+            changed["command_delay"] = np.array(max(value, 0.0))
         elif p.kind == "plant":
             name, index = _vehicle_element(p.plant)
             changed[name][index] = value
             changed[name][index[::-1]] = value
+    if late:  # what all have in common is that of the commands
+        changed["command_delay"] = np.array(max(0.0, min(late.values())))
     for array in changed.values():
         array.setflags(write=False)
-    return replace(vehicle, **changed | {name: float(changed[name]) for name in _FORCES})
+    numbers = {name: float(changed[name]) for name in (*_FORCES, "command_delay")}
+    rest = {sensor: x - numbers["command_delay"] for sensor, x in late.items()}
+    sensor_delay = {**vehicle.sensor_delay, **{sensor: x for sensor, x in rest.items() if x > _MIN_DELAY}}
+    return replace(vehicle, **changed | numbers, sensor_delay=sensor_delay)
 
 
 @dataclass(frozen=True)
@@ -167,13 +182,14 @@ class Setting:
 
 
 def setting_of(
-    parameters: Sequence[Parameter], values: Array, run: int, forces: CommandedForces, lag: float
+    parameters: Sequence[Parameter], values: Array, run: int, forces: CommandedForces, vehicle: Vehicle
 ) -> Setting:
-    """Return the setting of a run; values (p,), lag [s]."""
-    n, plant, delays = forces.thrusters, dict[str, float](), dict[str, float]()
+    """Return the setting of a run; values (p,)."""
+    n, plant, lag = forces.thrusters, dict[str, float](), float(vehicle.thrust_time_constant.mean())
+    delays = dict.fromkeys(TOPICS, vehicle.command_delay)
     vectors = {
         "thrust": np.ones(n), "asymmetry": np.zeros(n), "phase": np.zeros(len(CHANGES)), "force": np.zeros(3),
-        "lever": np.zeros(3), "bias": np.zeros(3), "scale": np.zeros(1),
+        "lever": np.array(vehicle.dvl_position), "bias": np.zeros(3), "scale": np.zeros(1),
     }  # fmt: skip
     for p, x in zip(parameters, values, strict=True):
         if p.run not in (None, run):
@@ -255,8 +271,13 @@ def _elements(vehicle: Vehicle, key: str) -> Iterator[Parameter]:
             for i, x in enumerate(getattr(vehicle, name).tolist()):
                 deviation, unit = max(_RELATIVE * x, _MIN_DAMPING[name][i > 2]), _DAMPING_UNITS[name][i > 2]
                 yield Parameter(f"{key}.{i + 1}", unit, "plant", x, deviation, 0.0, plant=f"{name}[{i + 1}]")
-        case "time_constant":
-            yield Parameter(key, "s", "lag", float(vehicle.thrust_time_constant.mean()), _LAG, 0.0, _MAX_LAG)
+        case "dvl_position":
+            for i, x in enumerate(vehicle.dvl_position.tolist()):
+                plant = f"dvl.position.{'xyz'[i]}"
+                yield Parameter(f"{key}.{i + 1}", "m", "lever", x, _LEVER, plant=plant, index=i)
+        case "time_constant" | "delay":
+            lag = Parameter(key, "s", "lag", float(vehicle.thrust_time_constant.mean()), _LAG, 0.0, _MAX_LAG)
+            yield lag if name != "delay" else Parameter(key, "s", "delay", vehicle.command_delay, _DELAY)
         case _:
             for i in range(vehicle.n_thrusters):
                 yield Parameter(f"{key}.{i + 1}", "", "thrust", 1.0, _THRUST, 0.1, 10.0, index=i)

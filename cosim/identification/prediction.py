@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cosim.errors import IdentificationError
-from cosim.identification.delays import move_back
+from cosim.identification.delays import move_back, usual_delays
 from cosim.identification.fit import Fit, fit, single_thread
 from cosim.identification.log import TOPICS, Log
 from cosim.identification.measurements import NO_ERRORS, residual
@@ -32,6 +32,7 @@ AUTO = "auto"  # in place of names of nuisances
 _COUPLINGS = tuple(f"hydrodynamics.added_mass.{i}.{j}" for i in (1, 2, 3) for j in range(i + 1, 7))
 _HORIZONS = (2.0, 5.0)  # s, of the predictions that are compared
 _TRIM = ("hydrostatics.trim.1", "hydrostatics.trim.2")  # forward and right: the vertical one is that of the buoyancy
+_LEVER = tuple(f"sensors.dvl_position.{i}" for i in (1, 2, 3))
 _FOLDS = 2
 _MIN_GAIN = 1e-3
 _CLEAR = 1.0  # standard errors of the mean over the runs, by which a choice must be better
@@ -60,7 +61,7 @@ def validate(
     # `modes`: with attitude and angular velocity predicted (False), and with those that were measured as inputs (True).
     # `compare`: the errors of the start vehicle and of a constant velocity too.
     starts = np.array([p.start if not p.is_nuisance else x for p, x in zip(parameters, values, strict=True)])
-    logs = [move_back(log, _delays(parameters, values)) for log in logs]
+    logs = [move_back(log, _delays(vehicle, parameters, values)) for log in logs]
     predictions = []
     for horizon, measured in itertools.product(horizons, modes):
         windows, _ = cut_windows(logs, vehicle, step, horizon)
@@ -86,7 +87,7 @@ def validate(
 def predicted_samples(log: Log, fit: Fit, vehicle: Vehicle, horizon: float) -> tuple[Array, Array, Array]:
     """Return times [s], (n,), measured and predicted velocities, (n, 3), where a run is predicted; horizon [s]."""
     parameters, values = with_mean_nuisances(fit.parameters, fit.values)
-    corrected_log = move_back(log, _delays(parameters, values))
+    corrected_log = move_back(log, _delays(vehicle, parameters, values))
     windows, _ = cut_windows([corrected_log], vehicle, fit.step, horizon)
     problem = Residuals([corrected_log], vehicle, parameters, windows, fit.step, turns_measured=fit.turns_measured)
     settings = problem.settings(values)
@@ -102,9 +103,11 @@ def predicted_samples(log: Log, fit: Fit, vehicle: Vehicle, horizon: float) -> t
     return times, measured, predicted
 
 
-def _delays(parameters: Sequence[Parameter], values: Array) -> dict[str, float]:
+def _delays(vehicle: Vehicle, parameters: Sequence[Parameter], values: Array) -> dict[str, float]:
     """Return the delays [s] by topic."""
-    return {name: float(x) for p, x in zip(parameters, values, strict=True) if p.kind == "delay" for name in p.topics}
+    return usual_delays(vehicle) | {
+        name: float(x) for p, x in zip(parameters, values, strict=True) if p.kind == "delay" for name in p.topics
+    }
 
 
 def _summarize(
@@ -201,16 +204,15 @@ def choose_structure(logs: Sequence[Log], vehicle: Vehicle, keys: Sequence[str] 
     """Choose nuisances, couplings and damping so that runs that were not fitted are predicted best."""
     if len(logs) < 2 * _FOLDS:
         raise IdentificationError(f"--nuisance {AUTO}: has {len(logs)} runs, expected {2 * _FOLDS} or more to compare")
-    base = [_shared(p) for p in free_parameters(vehicle, keys or TRANSLATION_FREE)]
+    base = [_shared(p) for p in free_parameters(vehicle, (*(keys or TRANSLATION_FREE), "thrusters.delay"))]
     groups = {
         "trim": [key for key in _TRIM if key not in base],
         "current": [_shared(p) for p in nuisances(("current",), logs)],
-        "lever": [_shared(p) for p in nuisances(("lever",), logs)],
+        "lever": [key for key in _LEVER if key not in base],
         "scale": [_shared(p) for p in nuisances(("scale",), logs)],
         "coupled added mass": [] if keys else [_shared(p) for p in free_parameters(vehicle, _COUPLINGS)],
     }
-    delays = [_shared(p) for p in nuisances(("delay",), logs, common_delay=True)]
-    taken, zero = {*base, *delays}, set[str]()
+    taken, zero = {*base}, set[str]()
     folds = [
         _fold(logs, vehicle, base, [name for group in groups.values() for name in group], k) for k in range(_FOLDS)
     ]
@@ -229,8 +231,10 @@ def choose_structure(logs: Sequence[Log], vehicle: Vehicle, keys: Sequence[str] 
         choices.append(replace(choice, is_taken=choice.gain > 0.0 and not zero))
         if choices[-1].is_taken:
             zero, best = zero | removed, scores
-    every = free_parameters(vehicle, (*(keys or TRANSLATION_FREE), *_TRIM, *(() if keys else _COUPLINGS)))
-    every += nuisances(("current", "delay", "lever", "scale"), logs, common_delay=True)
+    every = free_parameters(
+        vehicle, (*(keys or TRANSLATION_FREE), "thrusters.delay", *_TRIM, *_LEVER, *(() if keys else _COUPLINGS))
+    )
+    every += nuisances(("current", "scale"), logs)
     absent = [p for p in every if _shared(p) in zero]
     return Structure(
         with_values(vehicle, absent, np.zeros(len(absent))),
@@ -243,13 +247,11 @@ def _fold(logs: Sequence[Log], vehicle: Vehicle, base: Sequence[str], candidates
     """Fit the base to the runs that are not of fold k, and linearize all candidates there."""
     train = [log for run, log in enumerate(logs) if run % _FOLDS != k]
     runs = [run for run in range(len(logs)) if run % _FOLDS == k]
-    known = {
-        _shared(p): p for p in free_parameters(vehicle, [n for n in (*base, *candidates) if n.startswith("hydro")])
-    }
-    parameters = [known[name] for name in base] + nuisances(("delay",), train, common_delay=True)
+    known = {p.name: p for p in free_parameters(vehicle, [n for n in (*base, *candidates) if "." in n])}
+    parameters = [known[name] for name in base]
     done = fit(train, vehicle, parameters, turns_measured=True)
     added = [known[name] for name in candidates if name in known]
-    added += [p for p in nuisances(("current", "lever", "scale"), train) if _shared(p) in candidates]
+    added += [p for p in nuisances(("current", "scale"), train) if _shared(p) in candidates]
     every = [*done.parameters, *added]
     values = np.concatenate([done.values, [p.start for p in added]])
     problem = Residuals(done.logs, vehicle, every, done.windows, done.step, turns_measured=True)
@@ -264,7 +266,12 @@ def _scores(folds: Sequence[_Fold], vehicle: Vehicle, free: set[str], zero: set[
     for fold in folds:
         values = fold.step_to([*free], [*zero])
         predictions = validate(
-            fold.test, vehicle, *with_mean_nuisances(fold.parameters, values), fold.step, _HORIZONS, (True,),
+            fold.test,
+            vehicle,
+            *with_mean_nuisances(fold.parameters, values),
+            fold.step,
+            _HORIZONS,
+            (True,),
             compare=False,
         )
         by_horizon = [p.scores for p in predictions if p.topic in ("velocity", "position")]

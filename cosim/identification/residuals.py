@@ -69,7 +69,7 @@ class Residuals:
             windows = [replace(w, topics=topics) for w, topics in kept]
         self.parameters, self.windows = tuple(parameters), tuple(windows)
         self._shooter, self._step = Shooter(vehicle), step
-        self._lag = float(vehicle.thrust_time_constant.mean())
+        self._vehicle = vehicle
         self._forces = [CommandedForces(log, vehicle, step) for log in logs]
         has_position = any(topic.name == "position" for log in logs for topic in log.topics)
         has_depth = has_position or any(topic.name == "depth" for log in logs for topic in log.topics)
@@ -95,7 +95,9 @@ class Residuals:
 
     def settings(self, values: Array) -> list[Setting]:
         """Return the settings of each run by the free numbers."""
-        return [setting_of(self.parameters, values, run, forces, self._lag) for run, forces in enumerate(self._forces)]
+        return [
+            setting_of(self.parameters, values, run, forces, self._vehicle) for run, forces in enumerate(self._forces)
+        ]
 
     def raw(self, i: int, settings: Sequence[Setting], start: Array, full: bool) -> tuple[Array, Array, Array]:
         """Return residuals of a window from a start, with derivatives by the start and, if `full`, the free numbers."""

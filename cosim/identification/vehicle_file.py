@@ -25,7 +25,8 @@ _MAX_TRIALS = 100  # draws per vehicle, until its mass matrix is positive defini
 _WIDTH = 118  # maximum length of a comment
 _ATTRIBUTES = {
     "rigid_body.center_of_gravity": "r_G", "hydrostatics.center_of_buoyancy": "r_B",
-    "thrusters.matrix": "thruster_matrix", "thrusters.time_constant": "thrust_time_constant",
+    "thrusters.delay": "command_delay", "thrusters.matrix": "thruster_matrix",
+    "thrusters.time_constant": "thrust_time_constant",
 }  # fmt: skip
 
 
@@ -37,9 +38,12 @@ def vehicle_text(start: str, vehicle: Vehicle, fit: Fit, name: str, provenance: 
     tables["source"] = (
         f"Identified from runs, see the comments; what was not free is that of {vehicle.name}: " + vehicle.source
     )
-    for key in fit.free_keys():
+    delays = [p for p in fit.parameters if p.kind == "delay" and p.is_nuisance]
+    for key in (*fit.free_keys(), *(("thrusters.delay",) if delays else ())):
         table, _, entry = key.partition(".")
-        tables[table][entry] = _entry(key, identified)
+        tables[table] = tables.get(table, {}) | {entry: _entry(key, identified)}
+    if identified.sensor_delay:
+        tables["sensors"] = tables.get("sensors", {}) | {"delay": dict(identified.sensor_delay)}
     lines = [*(f"# {line}" for sentence in provenance for line in textwrap.wrap(sentence, _WIDTH)), ""]
     table = ""
     for line in scenario_text(tables, {}).splitlines():
@@ -125,6 +129,6 @@ def _plant_parameters(fit: Fit, indices: Sequence[int], values: NDArray[np.float
         elif p.kind == "thrust":
             column = body.thruster_matrix[:, p.index]
             plant |= {f"thruster_matrix[{k + 1},{p.index + 1}]": float(column[k]) for k in np.flatnonzero(column)}
-        else:
+        elif p.plant:
             plant[p.plant] = value
     return plant

@@ -15,6 +15,7 @@ from controller.navigation import SensorModel
 from controller.navigation.measurements import SENSORS
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import Outage
+from plant_fmu.vehicle import Vehicle
 
 SENSOR_NAMES = dict(zip(SENSORS, ("Pressure sensor", "DVL", "IMU", "Compass", "USBL"), strict=True))
 
@@ -55,8 +56,8 @@ _STREAM = 2  # second part of the generator's seed, which separates its stream f
 _ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
 
 
-def sensor_parameters(seed: int, over: Mapping[str, float]) -> dict[str, float]:
-    """Return the FMU's sensor parameters by name: from data sheets, with constant errors drawn from the seed."""
+def sensor_parameters(seed: int, over: Mapping[str, float], vehicle: Vehicle) -> dict[str, float]:
+    """Return the FMU's sensor parameters: from data sheets and the vehicle, with constant errors from the seed."""
     draw = np.random.default_rng([seed, _STREAM]).standard_normal(9)
     names = (
         *((f"imu.acceleration_bias.{axis}", _CONSTANT.acceleration_bias) for axis in "xyz"),
@@ -66,14 +67,18 @@ def sensor_parameters(seed: int, over: Mapping[str, float]) -> dict[str, float]:
         ("dvl.scale_error", _CONSTANT.velocity_scale),
     )
     constant = {name: float(x * deviation) for x, (name, deviation) in zip(draw, names, strict=True)}
-    return DATA_SHEETS | constant | {"seed": float(seed % 2**31)} | dict(over)
+    own = {f"dvl.position.{a}": float(x) for a, x in zip("xyz", vehicle.dvl_position, strict=True)}
+    own |= {f"{sensor}.delay": delay for sensor, delay in vehicle.sensor_delay.items()}
+    return DATA_SHEETS | own | constant | {"seed": float(seed % 2**31)} | dict(over)
 
 
 def scenario_sensors(scenario: Scenario) -> dict[str, float]:
     """Return the FMU's sensor parameters of a scenario by name; empty unless it senses through sensors."""
     if scenario.sensing.through != "sensors":
         return {}
-    return sensor_parameters(scenario.sensing.seed, {k: float(v) for k, v in scenario.plant.parameters.items()})
+    return sensor_parameters(
+        scenario.sensing.seed, {k: float(v) for k, v in scenario.plant.parameters.items()}, scenario.vehicle
+    )
 
 
 def sensor_model(parameters: Mapping[str, float]) -> SensorModel:
@@ -87,6 +92,7 @@ def sensor_model(parameters: Mapping[str, float]) -> SensorModel:
         heading=parameters.get("compass.noise", usual.heading),
         position=parameters.get("usbl.noise", usual.position),
         gravity=parameters.get("gravity", usual.gravity),
+        dvl_position=np.array([parameters.get(f"dvl.position.{axis}", 0.0) for axis in "xyz"]),
     )
 
 

@@ -23,7 +23,7 @@ def vehicle_model(vehicle: Vehicle) -> VehicleModel:
         thruster_matrix=np.ascontiguousarray(vehicle.thruster_matrix, dtype=float),
         thrust_min=np.array(vehicle.thrust_min, dtype=float),
         thrust_max=np.array(vehicle.thrust_max, dtype=float),
-        thrust_time_constant=np.array(vehicle.thrust_time_constant, dtype=float),
+        thrust_time_constant=vehicle.thrust_time_constant + vehicle.command_delay,  # a delay acts like more lag
         trim=np.array(vehicle.trim, dtype=float),
     )
     works = ~np.eye(vehicle.n_thrusters + 1, vehicle.n_thrusters, dtype=bool)

@@ -141,6 +141,7 @@ def _require(scenario: Scenario) -> None:
             "'closed' or 'exact', such as by --set arbiter.engine=closed",
         ),
         (not scenario.plant_fmu, "plant.file", "given", "none"),
+        (not scenario.vehicle.command_delay, "thrusters.delay", f"{scenario.vehicle.command_delay:g} s", "0"),
         (not (scenario.law.fmu and late), "time.control", f"{scenario.time.control:g} s", "time.step with law.file"),
         (not (scenario.law.fmu and stuck), "failures", "of stuck thrusters", "others with law.file"),
         (not scenario.commands.enabled, "commands.enabled", "true", "false: a system takes no commands"),

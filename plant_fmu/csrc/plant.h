@@ -79,6 +79,7 @@ typedef struct {
     double sensor_rate[N_SENSORS];             /* Hz, 0: continuous and without noise */
     double noise[N_NOISES];                    /* standard deviations, in the channel's unit */
     double bias[N_MEASURED];
+    double r_DVL[3];                           /* m, position of the DVL */
     double velocity_scale_error;               /* of the DVL, as a fraction of the velocity */
     double delay[N_SENSORS];                   /* s, from a sample to its delivery */
     double loss_probability[N_SENSORS];        /* of each sample */

@@ -24,7 +24,7 @@ def variables(vehicle: Vehicle, coupled: bool = False) -> list[Variable]:
         *_derivatives(vehicle),
         *_parameters(vehicle),
         *_environment(vehicle),
-        *_sensors(),
+        *_sensors(vehicle),
         *(coupling_parameters() if coupled else ()),
         *_discrete(vehicle),
     ]
@@ -276,7 +276,7 @@ def _environment(vehicle: Vehicle) -> Iterator[Variable]:
         yield _parameter(name, name, quantity, description, start)
 
 
-def _sensors() -> Iterator[Variable]:
+def _sensors(vehicle: Vehicle) -> Iterator[Variable]:
     for i, (sensor, what) in enumerate(SENSORS):
         description = f"Sample rate of {what}; 0: continuous, without noise"
         yield _parameter(f"{sensor}.rate", f"sensor_rate[{i}]", q.SAMPLE_RATE, description)
@@ -302,6 +302,10 @@ def _sensors() -> Iterator[Variable]:
         ("compass.bias", "MEASURED_HEADING", "rad"),
     ):
         yield _parameter(name, f"bias[{channel}]", q.bias(unit), "Constant error")
+    for i, axis in enumerate(AXES):
+        yield _parameter(
+            f"dvl.position.{axis}", f"r_DVL[{i}]", q.LEVER, f"Position of the DVL, body {axis}", vehicle.dvl_position[i]
+        )
     description = "Scale error of the DVL, as a fraction of the velocity"
     yield _parameter("dvl.scale_error", "velocity_scale_error", q.SCALE_ERROR, description)
 

@@ -201,7 +201,9 @@ def evaluate(v, n_thrusters, drift=(0, 0, 0), drift_slope=(0, 0, 0)):
     heading = yaw + v["compass.bias"]
     out["measured.heading"] = heading - TURN * np.round(np.real(heading) / TURN)
     for i, a in enumerate(AXES):
-        out[f"measured.velocity.{'uvw'[i]}"] = (1 + v["dvl.scale_error"]) * nu[i]
+        out[f"measured.velocity.{'uvw'[i]}"] = (1 + v["dvl.scale_error"]) * (
+            nu[:3] + np.cross(omega, vector(v, "dvl.position"))
+        )[i]
         out[f"measured.acceleration.{a}"] = specific[i] + v[f"imu.acceleration_bias.{a}"]
         rate = "pqr"[i]
         out[f"measured.angular_velocity.{rate}"] = omega[i] + v[f"imu.angular_velocity_bias.{rate}"]

@@ -8,7 +8,7 @@ import pytest
 
 from cosim.command_line.cli import main
 from cosim.identification.log import load_log, measured_turns
-from cosim.identification.parameters import nuisances
+from cosim.identification.parameters import free_parameters
 from cosim.identification.prediction import validate
 from plant_fmu import load_vehicle
 from tests.cosim.identification.pool_pairs import TRUE, VEHICLE, write_pairs
@@ -45,7 +45,7 @@ def true_r2(folder, runs):
         quadratic_damping=TRUE["quadratic"], trim=TRUE["trim"],
     )  # fmt: skip
     logs = [load_log(run, vehicle) for run in runs]
-    parameters = nuisances(("delay",), logs, common_delay=True)
+    parameters = free_parameters(vehicle, ("thrusters.delay",))
     values = np.array([TRUE["delay"] + TRUE["lag"]])
     found = validate(logs, vehicle, parameters, values, 0.04, (2.0, 5.0), (True,))
     return {p.horizon: p.r2 for p in found if p.topic == "velocity"}
