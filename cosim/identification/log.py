@@ -33,11 +33,11 @@ _MIN_SAMPLES = 20  # number of samples of a topic, and of commands
 _DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # fourth difference: its variance is 70 times that of white noise
 _MAD = 1.4826  # standard deviation of a normal distribution, in median absolute deviations
 
-_HALF_TURNS = np.zeros((4, 3, 4))  # derivative of `half_turns` by the quaternion
-_HALF_TURNS[[1, 0, 3, 2, 2, 3, 0, 1, 3, 2, 1, 0], [0] * 4 + [1] * 4 + [2] * 4, [0, 1, 2, 3] * 3] = (
-    -1, 1, 1, -1, -1, -1, 1, 1, -1, 1, -1, 1,
-)  # fmt: skip
-_HALF_TURNS = _HALF_TURNS.reshape(4, 12)
+# (4, 12) rows of `half_turns`, flat, by each component of the quaternion
+_HALF_TURNS = np.array([
+    [0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1], [-1, 0, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0],
+    [0, 0, 0, -1, -1, 0, 0, 0, 0, 1, 0, 0], [0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 0],
+], float)  # fmt: skip
 _SAMPLED = ("pulses", "effort")  # quantities of commands that an autopilot logs slower than it changes them
 _MEANS = ("VISO", "VISION_POSITION_DELTA")  # DVL messages with the displacement since the last message
 

@@ -42,7 +42,7 @@ def random_values(slave, rng):
         (("linear_damping", "quadratic_damping"), lambda: rng.uniform(1.0, 60.0)),
         (("current.", "current_shear.", "current_input"), lambda: 0.3 * rng.normal()),
         (("thrust[", "wrench.", "actuator.", "load.", "trim."), lambda: 25.0 * rng.normal()),
-        (("load.world.point", "load.body.point"), lambda: 0.3 * rng.normal()),
+        (("load.world.point", "load.body.point", "dvl.position"), lambda: 0.3 * rng.normal()),
         (("thrust_dead_band", "thrust_curve", "thrust_effectiveness", "thrust_failure"),
          lambda: rng.uniform(0.02, 0.6)),
         (("thruster_matrix",), rng.normal),

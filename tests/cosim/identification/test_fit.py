@@ -241,7 +241,7 @@ def test_slow_commands_are_named(log, period, is_slow):
 def test_free_parameters_are_selected_by_key(vehicle):
     names = [p.name for p in free_parameters(vehicle, ("hydrodynamics.added_mass.diagonal",))]
     assert names == [f"hydrodynamics.added_mass.{i}.{i}" for i in range(1, 7)]
-    assert len(free_parameters(vehicle, DEFAULT_FREE)) == 21 + 12 + 4 + 1
+    assert len(free_parameters(vehicle, DEFAULT_FREE)) == 21 + 12 + 4 + 1 + 3
     assert [p.plant for p in free_parameters(vehicle, ("hydrodynamics.added_mass.6.2",))] == ["added_mass[2,6]"]
     for key in ("hydrodynamics.added_mass.7.7", "hull.radius", "mass"):
         with pytest.raises(IdentificationError, match="--free"):
@@ -250,10 +250,18 @@ def test_free_parameters_are_selected_by_key(vehicle):
 
 def test_fitted_values_are_applied_to_the_vehicle(vehicle):
     keys = ("hydrodynamics.added_mass.2.6", "thrusters.matrix.3", "thrusters.time_constant", "hydrostatics.buoyancy")
-    changed = with_values(vehicle, free_parameters(vehicle, keys), np.array([0.5, 1.1, 0.2, 130.0]))
+    keys = (*keys, "sensors.dvl_position.3", "thrusters.delay")
+    changed = with_values(vehicle, free_parameters(vehicle, keys), np.array([0.5, 1.1, 0.2, 130.0, 0.3, 0.12]))
+    assert changed.dvl_position.tolist() == [0.0, 0.0, 0.3] and changed.command_delay == 0.12
     assert changed.added_mass[1, 5] == changed.added_mass[5, 1] == 0.5
     assert changed.thruster_matrix[:, 2] == pytest.approx(1.1 * vehicle.thruster_matrix[:, 2])
     assert (changed.thrust_time_constant == 0.2).all() and changed.buoyancy == 130.0
+
+
+def test_what_all_delays_share_is_that_of_the_commands(vehicle, log):
+    delays = nuisances(("delay",), [log])
+    late = with_values(vehicle, delays, np.array([0.25 if p.plant == "velocity" else 0.1 for p in delays]))
+    assert late.command_delay == pytest.approx(0.1) and late.sensor_delay == {"dvl": pytest.approx(0.15)}
 
 
 def test_windows_that_tumble_or_have_gaps_are_rejected(log, vehicle):

@@ -76,6 +76,7 @@ def test_pool_pairs_are_predicted_nearly_as_well_as_by_the_true_vehicle(tmp_path
     assert np.diag(vehicle.added_mass)[:3] == pytest.approx(np.diag(TRUE["added_mass"])[:3], rel=0.2)
     assert vehicle.buoyancy - vehicle.weight == pytest.approx(TRUE["buoyancy"] - 112.8, abs=0.5)
     assert vehicle.trim[:2] == pytest.approx(TRUE["trim"][:2], abs=0.5) and not vehicle.trim[2:].any()
+    assert vehicle.command_delay == pytest.approx(TRUE["delay"] + TRUE["lag"], abs=0.03)
     page = out.with_suffix(".html").read_text()
     command = re.search(r"cosim identify [^<]*--out mine.toml", page)
     words = shlex.split(command[0].replace("&#39;", "'"))
