@@ -18,7 +18,7 @@ from cosim.identification.delays import delay_of, find_delays, move_back, usual_
 from cosim.identification.intervals import DISAGREES, MAX_PRIOR_FRACTION, Intervals, estimate_intervals
 from cosim.identification.log import Log, command_spans
 from cosim.identification.parameters import Parameter
-from cosim.identification.residuals import Reduced, Residuals
+from cosim.identification.residuals import Reduced, Residuals, of_windows
 from cosim.identification.windows import MARGINS, Window, cut_windows
 from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
@@ -223,7 +223,7 @@ class Problem:
             settings = self.residuals.settings(values)
             p = len(values)
             try:
-                reduced = [self.residuals.reduced(i, settings, values) for i in range(len(self.residuals.windows))]
+                reduced = of_windows(lambda i: self.residuals.reduced(i, settings, values), self.residuals)
             except IdentificationError as error:
                 if self._known is None:
                     raise IdentificationError("the start vehicle predicts no finite motion") from error

@@ -6,9 +6,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -22,6 +24,8 @@ from cosim.identification.shooting import NO_DIRECTIONS, STATE_SIZE, Directions,
 from cosim.identification.windows import Window
 from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
+
+Result = TypeVar("Result")
 
 _START_DEVIATIONS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0)  # m, rad, m/s, rad/s
 _TURNS = ("attitude", "angular_velocity")  # topics that may be inputs
@@ -153,7 +157,8 @@ class Residuals:
             size, several = len(topic.times), len(topic.offsets)
             at = back[count : count + several * size].reshape(several, size)
             count += several * size
-            sampled = Motion(*(x[at].mean(axis=0) for x in (motion.states, motion.rates, motion.tangents)))
+            parts = (motion.states, motion.rates, motion.tangents)
+            sampled = Motion(*(x[at[0]] if several == 1 else x[at].mean(axis=0) for x in parts))
             along = measurements.derivative(topic, sampled.states, sampled.tangents, setting.errors)
             yield topic, sampled, along.reshape(size * len(topic.components), -1)
 
@@ -169,7 +174,7 @@ class Residuals:
         if not any(forces.impulses for forces in self._forces):
             return
         settings = self.settings(values)
-        starts = [self.solve_start(i, settings, values) for i in range(len(self.windows))]
+        starts = of_windows(lambda i: self.solve_start(i, settings, values), self)
         self.whiteners = [None] * len(self.windows)
         by_impulses, left, projected = list[Array](), list[Array](), list[Array]()
         for i, start in enumerate(starts):
@@ -347,10 +352,16 @@ class Residuals:
         return moved
 
 
+def of_windows(function: Callable[[int], Result], problem: Residuals) -> list[Result]:
+    """Return a function's results for the index of each window; what is compiled in it runs on all processors."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(function, range(len(problem.windows))))
+
+
 def normal_equations(problem: Residuals, values: Array) -> tuple[Array, Array, float, int]:
     """Return information, score, sum of squares and number of residuals, with the priors in the first two."""
     settings = problem.settings(values)
-    reduced = [problem.reduced(i, settings, values) for i in range(len(problem.windows))]
+    reduced = of_windows(lambda i: problem.reduced(i, settings, values), problem)
     deviation, start = (np.array([getattr(p, name) for p in problem.parameters]) for name in ("deviation", "start"))
     information = np.diag(deviation**-2.0) + sum(r.jacobian.T @ r.jacobian for r in reduced)
     score = (values - start) / deviation**2 + sum(r.jacobian.T @ r.residual for r in reduced)

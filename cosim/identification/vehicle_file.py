@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 import textwrap
@@ -108,8 +109,9 @@ def draw_plants(fit: Fit, vehicle: Vehicle, seed: int, count: int = DRAWS) -> li
     covariance = fit.intervals.covariance[np.ix_(indices, indices)]
     rng = np.random.default_rng([seed, 28])
     plants: list[dict[str, float]] = []
-    for _ in range(_MAX_TRIALS * count):
-        values = np.clip(rng.multivariate_normal(fit.values[indices], covariance), low, high)
+    blocks = (rng.multivariate_normal(fit.values[indices], covariance, count) for _ in range(_MAX_TRIALS))
+    for drawn in itertools.chain.from_iterable(blocks):
+        values = np.clip(drawn, low, high)
         body = with_values(vehicle, parameters, values)
         if np.linalg.eigvalsh(body.mass_matrix)[0] <= 0.0:
             continue
