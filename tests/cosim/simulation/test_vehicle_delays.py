@@ -9,6 +9,8 @@ import plant_fmu
 from cosim.scenario.scenario import load_scenario
 from tests.cosim.simulation.keep import kept_rows
 
+pytestmark = pytest.mark.medium
+
 SHIPPED = Path(plant_fmu.__file__).parent / "vehicles" / "bluerov2_heavy.toml"
 OWN = "[sensors]\ndvl_position = [0.5, -0.3, 0.4]\ndelay = { dvl = 0.15 }\n"
 
@@ -17,7 +19,7 @@ OWN = "[sensors]\ndvl_position = [0.5, -0.3, 0.4]\ndelay = { dvl = 0.15 }\n"
 def kept(tmp_path_factory):
     file = tmp_path_factory.mktemp("vehicle") / "late.toml"
     file.write_text(SHIPPED.read_text().replace("[thrusters]\n", "[thrusters]\ndelay = 0.05\n") + OWN)
-    given = ["sensing.through=sensors", "sensing.position_noise=0", "sensing.velocity_noise=0", "time.duration=20"]
+    given = ["sensing.through=sensors", "sensing.position_noise=0", "sensing.velocity_noise=0", "time.duration=12"]
     vehicle = [f'vehicle="{file}"', "actuation.through=thrusters", "time.step=0.01", "time.control=0.01"]
     lags = [f"plant.parameters.thrust_time_constant[{i}]=0" for i in range(1, 9)]
     return kept_rows(load_scenario("docking", [*given, *vehicle, *lags]))
