@@ -320,7 +320,8 @@ def _make_vehicle(file: _File) -> Vehicle:
 
     arrays = {name: _array(file, name, n) for name in _KEYS}
     vehicle = Vehicle(
-        name=file.name, title=file.title, source=source, hull_shape=file.hull.shape, sensor_delay={str(sensor): late for sensor, late in file.sensors.delay.items()},
+        name=file.name, title=file.title, source=source, hull_shape=file.hull.shape,
+        sensor_delay={str(sensor): late for sensor, late in file.sensors.delay.items()},
         autopilot=file.autopilot and file.autopilot.for_thrusters(n), **arrays,
     )  # fmt: skip
     above = bool((vehicle.thrust_min > vehicle.thrust_max).any())
