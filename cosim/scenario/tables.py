@@ -301,7 +301,8 @@ class LawEntry(FmuTable, frozen=True):
         require_text("name", self.name)
         if self.is_custom:
             if self.gains:
-                raise ValueError(f"gains has {next(iter(self.gains))!r}, expected no gains with a law in Python")
+                of = "an FMU as the law" if self.file else "a law in Python"
+                raise ValueError(f"gains has {next(iter(self.gains))!r}, expected no gains with {of}")
             return
         if self.name not in LAWS:
             new = "'ismail_dunnigan': the paper's law has its authors' names now" if self.name == "printed" else ""
