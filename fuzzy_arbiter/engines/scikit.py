@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
+from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
-from skfuzzy import centroid
-from skfuzzy.fuzzymath.fuzzy_ops import _interp_universe_fast, interp_membership
 
 from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.engines.engine import Defuzzifier, Engine
@@ -17,6 +18,29 @@ from fuzzy_arbiter.engines.supported import unsupported_reason
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.shapes import Array
 from fuzzy_arbiter.terms.term import Term
+
+_UNUSED = ("skfuzzy.cluster", "skfuzzy.fuzzymath._continuous_to_discrete")  # they import SciPy, which takes most time
+
+
+@contextmanager
+def _without_scipy() -> Iterator[None]:
+    """Import scikit-fuzzy without the parts that need SciPy, unless it is there; later imports find it whole."""
+    if "skfuzzy" in sys.modules:
+        yield
+        return
+    for name in _UNUSED:
+        sys.modules[name] = part = ModuleType(name)
+        part.__dict__.update(__all__=(), continuous_to_discrete=None)
+    try:
+        yield
+    finally:
+        for name in [name for name in sys.modules if name.partition(".")[0] == "skfuzzy"]:
+            del sys.modules[name]
+
+
+with _without_scipy():
+    from skfuzzy import centroid
+    from skfuzzy.fuzzymath.fuzzy_ops import _interp_universe_fast, interp_membership
 
 
 class ScikitEngine(Engine):

@@ -148,3 +148,16 @@ def test_scikit_fuzzy_warnings_are_suppressed():
     )
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
     assert (done.stdout.strip(), done.stderr) == ("(1.0, 0.0, 0.0)", "")
+
+
+def test_the_engine_imports_no_scipy_and_leaves_scikit_fuzzy_whole():
+    code = """
+import sys
+from fuzzy_arbiter.engines.scikit import centroid
+assert "scipy" not in sys.modules
+import skfuzzy
+assert skfuzzy.cmeans is skfuzzy.cluster.cmeans and skfuzzy.continuous_to_discrete
+assert centroid([0, 1, 3], [0, 1, 0]) == skfuzzy.centroid([0, 1, 3], [0, 1, 0])
+from fuzzy_arbiter.engines import scikit
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
