@@ -81,7 +81,7 @@ def without_defaults(table: Mapping[str, Any], kind: type[Table] = File) -> dict
 
 _CLOSE = 0.75  # least similarity to a key of the file's first level that alone is proposed
 _SIMILAR = 0.6  # least similarity to the last part of a key elsewhere
-_MAX_PROPOSED = 3
+_MAX_PROPOSED = 5
 
 
 def hint_of_key(name: str, vehicle: object) -> str:
