@@ -23,7 +23,7 @@ SHORT = [*TEN_MS, "time.duration=3", "sensing.position_noise=0", "sensing.veloci
 def assert_runs_alike(scenario, folder):
     own = kept_rows(scenario.replace({"master.order": "jacobi"}))
     path = package_system(scenario, folder / "own.ssp")
-    record = pq.read_table(run_system(path, folder / "run")[0] / "record.parquet")
+    record = pq.read_table(run_system(path, folder / "run").folder / "record.parquet")
     for name in MOTION:
         np.testing.assert_array_equal(record[f"plant.{name}"], own[name], name)
     rows = np.transpose([own[name] for name in MOTION])
