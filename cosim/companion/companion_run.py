@@ -47,7 +47,7 @@ _MIN_UNCERTAINTY = 0.05  # m, position error of an autopilot that no measurement
 # Errors of an autopilot's estimate are slow: its velocity may be off by some cm/s for a minute, its position has no
 # white noise. With a smaller velocity noise, the law's position would shift by (velocity error) / (rate of its filter).
 # Innovations stay biased, so they are no reason to let disturbances drift.
-# Their drag and current are therefore poorly told apart: what is missing to stay in the goal comes from an integral.
+# Current and drag are then poorly distinguished: an integral supplies the force that is missing to stay in the goal.
 _NOISE_GAINS = {
     "law.gains.position_noise": 0.01,
     "law.gains.velocity_noise": 0.05,

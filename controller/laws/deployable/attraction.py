@@ -11,9 +11,9 @@ from controller.linear_algebra import norm
 from controller.stack_array import Vector3, zeros
 
 _LOOKAHEAD = 0.4  # m, lookahead distance along the path
-_SLOW = 0.3  # m/s, desired speed below which the velocity's error is integrated
-_FORGETTING = 5.0  # s, time constant at which its integral is forgotten above that
-_LARGEST = 0.5  # largest integral, as a fraction of the acceleration
+_SLOW_SPEED = 0.3  # m/s, desired speed below which the velocity's error is integrated
+_DECAY_TIME = 5.0  # s, time constant at which the integral decays above that speed
+_MAX_INTEGRAL = 0.5  # maximum integral, as a fraction of `acceleration`
 _SLOWEST_CORNER = 0.25  # speed at corners of 120 degrees and more, as a fraction of the full speed
 
 
@@ -61,11 +61,11 @@ def desired_acceleration(desired: Vector3, velocity: Vector3, gains: DeployableG
 def integrate_error(
     integral: Vector3, desired: Vector3, velocity: Vector3, gains: DeployableGains, period: float
 ) -> None:
-    """Integrate the error of a slow velocity into an acceleration [m/s2], NED: a constant force that is not known."""
-    if norm(desired) < _SLOW:
+    """Integrate the velocity's error at low speed into an acceleration [m/s2], NED, against an unknown force."""
+    if norm(desired) < _SLOW_SPEED:
         integral += period * gains.integral * (desired - velocity)
     else:
-        integral *= 1.0 - min(period / _FORGETTING, 1.0)
-    size, largest = norm(integral), _LARGEST * gains.acceleration
-    if size > largest:
-        integral *= largest / size
+        integral *= 1.0 - min(period / _DECAY_TIME, 1.0)
+    size, max_size = norm(integral), _MAX_INTEGRAL * gains.acceleration
+    if size > max_size:
+        integral *= max_size / size

@@ -51,7 +51,7 @@ class DeployableMemory(State):
     rejected_samples: float  # number of these that it rejected
     weights: Weights  # sanitized weights of the arbiter, smoothed in two stages for hard regions; NaN at first
     reported: VectorM  # health of the thrusters as last reported
-    integral: Vector3  # m/s2, NED: integral of the error of a slow velocity
+    integral: Vector3  # m/s2, NED: integral of the velocity's error at low speed
     filtered_acceleration: Vector3  # m/s2, NED: desired acceleration by the thrusters, low-pass filtered
     thruster_acceleration: Columns6  # m/s2, rad/s2: acceleration by one newton of each thruster
     acceleration_ahead: Columns6  # m/s2, rad/s2: the same at the predicted attitude
