@@ -180,12 +180,14 @@ class Vehicle:
     thrust_rate_limit: NDArray[np.float64]  # (n,) N/s, maximum rate of the force; 0 for none
     thrust_dead_band: NDArray[np.float64]  # (n,) [-] fraction of the command's range that gives no force
     thrust_curve: NDArray[np.float64]  # (n,) [-] 0: force linear in the command; 1: quadratic
-    command_delay: float  # s, from a command to the begin of its force; runs have it, the FMU has not
+    command_delay: float  # s, from a command to the start of its force; runs apply it, the FMU does not
     dvl_position: NDArray[np.float64]  # (3,) m, body frame
     hull_radius: float  # m, radius of the sphere that meets surface and bottom
     autopilot: Autopilot | None = None  # map from servo outputs to thrusters; a channel and a sign for each
     hull_shape: Literal["frame", "sphere"] = "frame"  # shape in pictures
-    sensor_delay: Mapping[str, float] = field(default_factory=dict)  # s, of sensors with another one than usual
+    sensor_delay: Mapping[str, float] = field(
+        default_factory=dict
+    )  # s, of sensors whose delay is not their data sheet's
 
     @property
     def n_thrusters(self) -> int:

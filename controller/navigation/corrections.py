@@ -110,10 +110,11 @@ def _predict_sample(
         sample = values[MEASURED_VELOCITY : MEASURED_VELOCITY + 3]
         P, noise = memory.covariance, max(sensors.velocity, _LEAST_SCALE)
         unknown = max(P[VELOCITY, VELOCITY], P[VELOCITY + 1, VELOCITY + 1], P[VELOCITY + 2, VELOCITY + 2])
-        about = cross(_turn_rate(memory, measurements.times[DVL], quaternion), sensors.dvl_position)
+        lever_velocity = cross(_turn_rate(memory, measurements.times[DVL], quaternion), sensors.dvl_position)
         # an error of attitude acts on the true velocity, to which the sample is nearer
-        world_velocity = R @ (sample - scale * about) / scale if unknown > square(_UNKNOWN * noise) else velocity
-        innovation[:] = sample - scale * (R.T @ velocity + about)
+        body_velocity = sample - scale * lever_velocity
+        world_velocity = R @ body_velocity / scale if unknown > square(_UNKNOWN * noise) else velocity
+        innovation[:] = sample - scale * (R.T @ velocity + lever_velocity)
         rows[:, VELOCITY : VELOCITY + 3] = scale * R.T
         rows[:, ATTITUDE : ATTITUDE + 3] = scale * (R.T @ skew(world_velocity))
         rows[:, VELOCITY_SCALE] = R.T @ world_velocity

@@ -89,12 +89,12 @@ def locate(model: StepModel, data: StepData) -> None:
 
 def step_plant(model: StepModel, data: StepData, plant: PlantCalls) -> None:
     """Send the inputs after their delay, those of stuck thrusters as they are, and advance the plant."""
-    native, own, late = plant.native, data.stuck.size, data.delayed.shape[0]
+    native, own, delay = plant.native, data.stuck.size, data.delayed.shape[0]
     for i in range(own):
         sent = data.inputs[i]
-        if late > 0:
-            sent = data.delayed[data.k % late, i]
-            data.delayed[data.k % late, i] = data.inputs[i]
+        if delay > 0:
+            sent = data.delayed[data.k % delay, i]
+            data.delayed[data.k % delay, i] = data.inputs[i]
         native.inputs[i] = sent if np.isnan(data.stuck[i]) else data.stuck[i]
     call_all(data, data.components)
     data.inputs[own:] = native.inputs[own:]  # of a coupled plant: its caller sets them, or components

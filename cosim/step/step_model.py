@@ -111,7 +111,7 @@ class StepData(State):
     flags: Array  # (f,) Boolean outputs of the plant, from the end of the step
     inputs: Array  # (i,) inputs of the plant, as computed; after the vehicle's own those that others set
     wrench: Array  # (6,) N, N m: that of the inputs
-    delayed: Array  # (late, j) the vehicle's own inputs in the steps before, as many as their delay has
+    delayed: Array  # (delay, j) the vehicle's own inputs of the last steps, as many as their delay has
     goal: PackedRegions
     regions: PackedRegions
     goal_center: Array  # (3,) m, NED: center of the present goal, without its shift

@@ -24,16 +24,16 @@ void sensors_measure(const Parameters *p, const double rigid[N_RIGID], const dou
                      double altitude, double measured[N_MEASURED])
 {
     const double *nu = rigid + 7, *omega = rigid + 10;
-    double R[3][3], turning[3], about[3];
+    double R[3][3], turning[3], lever_velocity[3];
 
     plant_rotation(rigid + 3, R);
     cross(omega, nu, turning);
-    cross(omega, p->r_DVL, about);
+    cross(omega, p->r_DVL, lever_velocity);
     measured[MEASURED_DEPTH] = rigid[2];
     measured[MEASURED_ALTITUDE] = altitude;
     measured[MEASURED_HEADING] = heading;
     for (int i = 0; i < 3; i++) {
-        measured[MEASURED_VELOCITY + i] = (1.0 + p->velocity_scale_error) * (nu[i] + about[i]);
+        measured[MEASURED_VELOCITY + i] = (1.0 + p->velocity_scale_error) * (nu[i] + lever_velocity[i]);
         /* specific force: acceleration less gravity, v' + w x v - g R^T e3 */
         measured[MEASURED_ACCELERATION + i] = rate[7 + i] + turning[i] - p->gravity * R[2][i];
         measured[MEASURED_ANGULAR_VELOCITY + i] = omega[i];

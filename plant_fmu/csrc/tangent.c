@@ -258,11 +258,11 @@ static void measured_tangent(const Model *m, const Model *seed, int starting, co
     const Parameters *p = &m->plant.parameters, *dp = &seed->plant.parameters;
     const double *nu = m->state.rigid + 7, *omega = m->state.rigid + 10;
     const double *dx = seed->state.rigid, *dnu = dx + 7, *domega = dx + 10;
-    double first[3], second[3], about[3], by_omega[3], by_lever[3];
+    double first[3], second[3], lever_velocity[3], by_omega[3], by_lever[3];
 
     cross(domega, nu, first);
     cross(omega, dnu, second);
-    cross(omega, p->r_DVL, about);
+    cross(omega, p->r_DVL, lever_velocity);
     cross(domega, p->r_DVL, by_omega);
     cross(omega, dp->r_DVL, by_lever);
     dmeasured[MEASURED_DEPTH] = dx[2];
@@ -270,7 +270,7 @@ static void measured_tangent(const Model *m, const Model *seed, int starting, co
     dmeasured[MEASURED_HEADING] = d->euler[2];
     for (int i = 0; i < 3; i++) {
         dmeasured[MEASURED_VELOCITY + i] = (1.0 + p->velocity_scale_error) * (dnu[i] + by_omega[i] + by_lever[i]) +
-                                           dp->velocity_scale_error * (nu[i] + about[i]);
+                                           dp->velocity_scale_error * (nu[i] + lever_velocity[i]);
         dmeasured[MEASURED_ACCELERATION + i] =
             d->rate.rigid[7 + i] + first[i] + second[i] - dp->gravity * R[2][i] - p->gravity * dR[2][i];
         dmeasured[MEASURED_ANGULAR_VELOCITY + i] = domega[i];
