@@ -197,7 +197,7 @@ def require_distinguishable(fit: Fit) -> None:
             raise IdentificationError(
                 f"{fit.parameters[lag].name} and the {fit.parameters[delay].name} are not separated by these runs "
                 f"(correlation {size:.2f}), expected one of the two: --free without the time constant, or "
-                "none of a delay"
+                "without a delay"
             )
 
 

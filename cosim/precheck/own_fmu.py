@@ -48,7 +48,7 @@ def component_findings(scenario: Scenario) -> Iterator[Finding]:
     for one in maps:
         name, text = one.fmu.name, f"{one.file.path.name} has {len(one.inputs)} of its inputs connected"
         if one.fmu is scenario.plant_fmu:
-            text += f", gives {len(targets)} of the vehicle's outputs, and starts by {len(start)} of its values"
+            text += f", gives {len(targets)} of the vehicle's outputs, and gets {len(start)} of its start values"
         else:
             text += f", sets {len(one.sent)} of the plant's inputs and {len(one.received - {*one.sent})} of others'"
         yield Finding("components", name, "holds", f"{text}; units and directions fit.")
