@@ -118,10 +118,8 @@ def positions_of_maximum(
 def _turning(samples: Samples, panels: Panels) -> tuple[Indices, Array]:
     """Return samples and positions where the height within a panel turns from rising to falling."""
     rows, starts, ends, heights = panels.rows, panels.starts, panels.ends, panels.heights[INNER]
-    for near in (
-        0.1,
-        0.0,
-    ):  # a part of the panel around the turn, which a polynomial meets more closely; then that turn
+    # a part of the panel around the turn, which a polynomial meets more closely; then that turn
+    for near in (0.1, 0.0):
         slope = legendre.legder(ANALYSIS @ heights)
         slopes = _DENSE_POLYNOMIALS @ slope
         index, items = np.nonzero((slopes[:-1] > 0.0) & (slopes[1:] <= 0.0))
