@@ -98,10 +98,10 @@ def test_a_distance_sensor_contradicts_a_scene_that_is_off(fraction, rotation, q
     else:
         direction = np.array([0.0, 0.0, sign])
     free = float(direction @ np.array([0.0, 0.0, 2.0]) + np.abs(direction) @ [5.0, 3.0, 2.0] - direction @ position)
-    found = Placement(POOL).contradictions(position, quaternion, {rotation: free + error, 12: 1.0})
-    assert (rotation in found) == (not -0.5 < error < 1.1)
-    if rotation in found:
-        assert float(re.findall(r"[\d.]+", found[rotation])[0]) == pytest.approx(free, abs=0.01)
+    contradictions = Placement(POOL).contradictions(position, quaternion, {rotation: free + error, 12: 1.0})
+    assert (rotation in contradictions) == (not -0.5 < error < 1.1)
+    if rotation in contradictions:
+        assert float(re.findall(r"[\d.]+", contradictions[rotation])[0]) == pytest.approx(free, abs=0.01)
 
 
 @pytest.mark.parametrize("north", [0.402, 1.5, 7.5])

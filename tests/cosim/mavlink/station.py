@@ -120,8 +120,8 @@ class Station:
         self, profile: str = "ardusub", commands: bool = True, of: Scenario | None = None, **options: Any
     ) -> None:
         self.commands, self.profile = CommandQueue(), PROFILES[profile]
-        options = MavlinkOptions(profile=profile, commands=commands, **options)  # type: ignore[arg-type]
-        self.context = VehicleContext(of or scenario(), COLUMNS, options, self.commands)  # type: ignore[arg-type]
+        link_options = MavlinkOptions(profile=profile, commands=commands, **options)  # type: ignore[arg-type]
+        self.context = VehicleContext(of or scenario(), COLUMNS, link_options, self.commands)
         self.autopilot = Autopilot(self.context)
         self.wire, self.now, self.time = Wire(), 100.0, 0.0
         self.autopilot.attach(self.wire)
