@@ -185,9 +185,7 @@ class Vehicle:
     hull_radius: float  # m, radius of the sphere that meets surface and bottom
     autopilot: Autopilot | None = None  # map from servo outputs to thrusters; a channel and a sign for each
     hull_shape: Literal["frame", "sphere"] = "frame"  # shape in pictures
-    sensor_delay: Mapping[str, float] = field(
-        default_factory=dict
-    )  # s, of sensors whose delay is not their data sheet's
+    sensor_delay: Mapping[str, float] = field(default_factory=dict)  # s, in place of a data sheet's, by sensor
 
     @property
     def n_thrusters(self) -> int:

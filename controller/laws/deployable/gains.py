@@ -17,9 +17,7 @@ class DeployableGains(NamedTuple):
     speed: float = 1.2  # m/s, greatest over ground
     acceleration: float = 0.35  # m/s2, with which the attraction speeds up and brakes
     velocity_bandwidth: float = 1.2  # rad/s, of the loop that follows the wanted velocity
-    integral: float = (
-        0.0  # 1/s2, of the velocity's error at low speed, for disturbances that are estimated badly; 0: none
-    )
+    integral: float = 0.0  # 1/s2, of the velocity's error at low speed, against disturbances estimated badly; 0: none
     smoothing: float = 0.05  # s, over which the wanted acceleration is smoothed, to spare the thrusters noise
     price_smoothing: float = 0.5  # s, of two stages that smooth the weights by which barriers yield, likewise
     position_bandwidth: float = 0.8  # 1/s, of the approach to the end of the path
